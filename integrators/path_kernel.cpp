@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "integrators/path_kernel.h"
+
+#include <algorithm>
+
+#include "renderer/core/error.h"
+#include "renderer/session/pixel_filter.h"
+#include "renderer/transport/mis.h"
+
+namespace braid {
+
+namespace {
+
+// Shadow rays stop this share of their length before the light, so that its own triangle does not shadow it.
+constexpr float kShadowLength = 1 - 1e-4f;
+constexpr int kMaxNullCrossings = 256;
+constexpr int kRouletteStart = 4;  // segments before Russian roulette begins
+
+// The normal by which lights are chosen at a hit.
+const Vec3& receiverNormal(const Hit& hit, bool twoSided) { return twoSided ? hit.ng : hit.frame.n; }
+
+}  // namespace
+
+void PathKernel::addEnvironment(const PathState& path, PathSample& sample) const {
+  const bool fromCamera = path.segments == 1;
+  if (fromCamera) sample.coverage = 0;
+  Spectrum radiance(0);
+  if (fromCamera && plan_.settings.background) {
+    radiance = *plan_.settings.background;
+  } else if (scene_.environment()) {
+    radiance = scene_.environment()->radiance(path.direction);
+  }
+  if (wantFeatures_ && !path.featuresDone) {
+    sample.features.albedo = radiance;
+    sample.features.normal = -path.direction;
+    sample.features.depth = 0;
+  }
+  if (fromCamera && plan_.settings.transparent) return;
+  float weight = 1;
+  if (!path.lightCouldNotBeSampled) weight = powerHeuristic(path.lastPdfW, context_.lights.pdfEnvironment(path.direction));
+  sample.radiance += path.throughput * radiance * weight;
+}
+
+void PathKernel::addEmission(const PathState& path, const Hit& hit, PathSample& sample) const {
+  const Material& material = *hit.material;
+  if (!hit.front && !material.doubleSided) return;
+  const Spectrum radiance = scene_.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
+  if (isBlack(radiance)) return;
+  float weight = 1;
+  if (!path.lightCouldNotBeSampled) {
+    const int64_t emitter = scene_.emitterIndex(hit.meshIndex, hit.triangle, hit.instance);
+    const float cosLight = glm::dot(hit.wo, hit.ng);
+    if (emitter >= 0 && cosLight > 0) {
+      const float distance = glm::length(hit.position - path.lastPosition);
+      weight = powerHeuristic(path.lastPdfW, context_.lights.pdfEmitter(path.lastPosition, path.lastNormal, path.lastTwoSided,
+                                                                        static_cast<size_t>(emitter), distance, cosLight));
+    }
+  }
+  sample.radiance += path.throughput * radiance * weight;
+}
+
+// A solid's surface inside a solid that rules there scatters nothing: keeps the books of what the path is inside of and goes on straight.
+bool PathKernel::crossNullInterface(PathState& path, const Hit& hit) const {
+  const uint32_t material = hit.mesh->material;
+  const int64_t other = path.media.ruling(scene_.materials(), hit.front ? -1 : static_cast<int64_t>(material));
+  if (other < 0 || !MediaStack::outranks(scene_.materials(), other, static_cast<int64_t>(material))) return false;
+  if (hit.front) path.media.enter(material);
+  else path.media.leave(material);
+  path.origin = offsetOrigin(hit, path.direction);
+  path.featureDistance += hit.distance;
+  path.lightCouldNotBeSampled = true;  // a shadow ray stops at the interface
+  ++path.nullCrossings;
+  return true;
+}
+
+// What an unlit surface shows, it shows to the camera and to mirrors only: it lights nothing (KHR_materials_unlit).
+void PathKernel::addUnlit(PathState& path, const Hit& hit, PathSample& sample) const {
+  const Spectrum color = baseColorAt(scene_, hit);
+  if (path.lightCouldNotBeSampled) sample.radiance += path.throughput * color;
+  if (!wantFeatures_ || path.featuresDone) return;
+  path.featuresDone = true;
+  sample.features.albedo = color;
+  sample.features.normal = hit.frame.n;
+  sample.features.depth = path.featureDistance + hit.distance;
+}
+
+void PathKernel::attenuate(PathState& path, float distance) const {
+  if (path.media.empty()) return;
+  const int64_t medium = path.media.ruling(scene_.materials());
+  if (medium >= 0) path.throughput *= volumeTransmittance(scene_.materials()[static_cast<size_t>(medium)], distance);
+}
+
+// Refractive index on the outside of a hit surface.
+float PathKernel::indexOutside(const PathState& path, const Hit& hit) const {
+  if (path.media.empty()) return 1;
+  const int64_t medium = path.media.ruling(scene_.materials(), hit.front ? -1 : static_cast<int64_t>(hit.mesh->material));
+  return medium < 0 ? 1.0f : scene_.materials()[static_cast<size_t>(medium)].ior;
+}
+
+void PathKernel::recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsdf, PathSample& sample) const {
+  path.featureDistance += hit.distance;
+  if (!bsdf.hasNonDelta() && path.segments < plan_.settings.maxDepth) return;
+  path.featuresDone = true;
+  sample.features.albedo = bsdf.albedo();
+  if (hit.material->emissive()) sample.features.albedo += scene_.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
+  sample.features.normal = hit.frame.n;
+  sample.features.depth = path.featureDistance;
+}
+
+bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const SampleBlock& block, ShadowRay& shadow) const {
+  LightSample light;
+  if (!context_.lights.sample(hit.position, receiverNormal(hit, twoSided), twoSided, block.u[slot::kLightSelect],
+                              {block.u[slot::kLightU], block.u[slot::kLightV]}, light))
+    return false;
+  const Vec3 wi = hit.frame.toLocal(light.wi);
+  const bool reflects = glm::dot(light.wi, hit.ng) > 0;
+  // Light on the other side of the geometric surface than of the shading one would leak through it.
+  if (reflects != (wi.z > 0) || (!reflects && !twoSided)) return false;
+  const BsdfValue value = bsdf.evaluate(wi);
+  if (isBlack(value.f)) return false;
+
+  const float weight = light.delta ? 1.0f : powerHeuristic(light.pdfW, value.pdfW);
+  shadow.contribution = path.throughput * value.f * light.radiance * (weight / light.pdfW);
+  shadow.origin = offsetOrigin(hit, light.wi);
+  shadow.direction = light.wi;
+  shadow.tmax = light.distance < kInfinity ? light.distance * kShadowLength : kInfinity;
+  shadow.salt = mix32(path.salt ^ 0x51ed270bu);
+  if (!path.media.empty() || hit.material->hasVolume()) {
+    MediaStack media = path.media;
+    if (!reflects && hit.material->hasVolume()) hit.front ? media.enter(hit.mesh->material) : media.leave(hit.mesh->material);
+    const int64_t medium = media.ruling(scene_.materials());
+    if (medium >= 0) shadow.contribution *= volumeTransmittance(scene_.materials()[static_cast<size_t>(medium)], light.distance);
+  }
+  return true;
+}
+
+// Continues the path in a direction sampled from the BSDF; false when it ends here.
+bool PathKernel::scatter(PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const SampleBlock& block) const {
+  BsdfSample sample;
+  if (!bsdf.sample(block.u[slot::kLobe], {block.u[slot::kBsdfU], block.u[slot::kBsdfV]}, sample)) return false;
+  const Vec3 direction = glm::normalize(hit.frame.toWorld(sample.wi));
+  const bool reflects = glm::dot(direction, hit.ng) > 0;
+  if (reflects == sample.transmitted) return false;
+  path.throughput *= sample.weight;
+  if (isBlack(path.throughput)) return false;
+
+  if (sample.transmitted && hit.material->hasVolume()) {
+    const int64_t before = path.media.ruling(scene_.materials());
+    hit.front ? path.media.enter(hit.mesh->material) : path.media.leave(hit.mesh->material);
+    const int64_t after = path.media.ruling(scene_.materials());
+    const auto index = [&](int64_t m) { return m < 0 ? 1.0f : std::max(scene_.materials()[static_cast<size_t>(m)].ior, 1e-3f); };
+    path.etaScale *= sqr(index(before) / index(after));
+  }
+  path.origin = offsetOrigin(hit, direction);
+  path.direction = direction;
+  path.lastPosition = hit.position;
+  path.lastNormal = receiverNormal(hit, twoSided);
+  path.lastTwoSided = twoSided;
+  path.lastPdfW = sample.pdfW;
+  path.lightCouldNotBeSampled = sample.delta;
+
+  if (path.segments >= kRouletteStart) {
+    const float survive = std::min(1.0f, maxComponent(path.throughput) / path.etaScale);
+    if (survive < 1) {
+      if (!(block.u[slot::kRoulette] < survive)) return false;
+      path.throughput /= survive;
+    }
+  }
+  return true;
+}
+
+void PathKernel::start(int x, int y, uint64_t key) {
+  BRAID_ASSERT(count_ < kBatch);
+  const SampleBlock camera = sampler_.block(key, 0);
+  const PixelFilter filter = plan_.settings.filter;
+  Vec2 offset(camera.u[slot::kPixelX] - 0.5f, camera.u[slot::kPixelY] - 0.5f);
+  if (filter != PixelFilter::Box) offset = {sampleFilter(filter, camera.u[slot::kPixelX]), sampleFilter(filter, camera.u[slot::kPixelY])};
+  const Camera::CameraRay ray = plan_.camera.ray(Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) + offset);
+  const auto i = static_cast<size_t>(count_++);
+  sample_[i] = PathSample();
+  PathState& path = path_[i];
+  path = PathState();
+  path.key = key;
+  path.origin = ray.origin;
+  path.direction = ray.direction;
+  path.segments = 1;
+}
+
+void PathKernel::run() {
+  std::array<int, kBatch> active;
+  int activeCount = count_;
+  for (int i = 0; i < count_; ++i) active[static_cast<size_t>(i)] = i;
+  std::array<ShadowRay, kBatch> shadow;
+  std::array<int, kBatch> shadowPath;
+  while (activeCount > 0) {
+    for (int a = 0; a < activeCount; ++a) {
+      const auto i = static_cast<size_t>(active[static_cast<size_t>(a)]);
+      PathState& path = path_[i];
+      if (filtered_) path.salt = sampler_.salt(path.key, static_cast<uint32_t>(path.segments + path.nullCrossings));
+      if (record_) record_->push_back({path.origin, path.direction, kInfinity, path.salt, false});
+      found_[i] = scene_.accel().intersect(path.origin, path.direction, kInfinity, path.salt, query_[i]);
+    }
+    rays += static_cast<uint64_t>(activeCount);
+
+    size_t shadows = 0;
+    int alive = 0;
+    for (int a = 0; a < activeCount; ++a) {
+      const int p = active[static_cast<size_t>(a)];
+      const auto i = static_cast<size_t>(p);
+      bool hasShadow = false;
+      const bool goesOn = shade(path_[i], found_[i], query_[i], sample_[i], shadow[shadows], hasShadow);
+      if (hasShadow) shadowPath[shadows++] = p;
+      if (goesOn) active[static_cast<size_t>(alive++)] = p;
+    }
+    for (size_t k = 0; k < shadows; ++k) {
+      const ShadowRay& ray = shadow[k];
+      if (record_) record_->push_back({ray.origin, ray.direction, ray.tmax, ray.salt, true});
+      if (scene_.accel().occluded(ray.origin, ray.direction, ray.tmax, ray.salt)) continue;
+      PathSample& sample = sample_[static_cast<size_t>(shadowPath[k])];
+      sample.radiance += ray.contribution;
+      if (ray.forFeatures) sample.features.visibility = 1;
+    }
+    shadowRays += shadows;
+    activeCount = alive;
+  }
+}
+
+bool PathKernel::shade(PathState& path, bool hitSomething, const RayHit& query, PathSample& sample, ShadowRay& shadow, bool& hasShadow) {
+  if (!hitSomething) {
+    addEnvironment(path, sample);
+    return false;
+  }
+  Hit hit;
+  makeHit(scene_, query, path.direction, hit);
+  const Material& material = *hit.material;
+  attenuate(path, hit.distance);
+  if (material.hasVolume() && crossNullInterface(path, hit)) return path.nullCrossings < kMaxNullCrossings;
+  if (material.unlit) {
+    addUnlit(path, hit, sample);
+    return false;
+  }
+  if (material.emissive()) addEmission(path, hit, sample);
+  const SurfaceParameters surface = surfaceAt(scene_, hit, context_.lobesOf(hit), indexOutside(path, hit));
+  const Bsdf bsdf(surface, hit.frame.toLocal(hit.wo));
+  const bool firstNonSpecular = wantFeatures_ && !path.featuresDone;
+  if (firstNonSpecular) recordFeatures(path, hit, bsdf, sample);
+  if (path.segments >= plan_.settings.maxDepth) return false;
+
+  const SampleBlock block = sampler_.block(path.key, static_cast<unsigned>(path.segments));
+  const bool twoSided = (surface.lobes & (kLobeTransmission | kLobeDiffuseTransmission)) != 0;
+  if (bsdf.hasNonDelta()) {
+    hasShadow = sampleLight(path, hit, bsdf, twoSided, block, shadow);
+    shadow.forFeatures = firstNonSpecular && path.featuresDone;
+  }
+  if (!scatter(path, hit, bsdf, twoSided, block)) return false;
+  ++path.segments;
+  return true;
+}
+
+}  // namespace braid

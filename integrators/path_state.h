@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// The state of a path between two vertices.
+#pragma once
+
+#include "renderer/core/sampler.h"
+#include "renderer/transport/bsdf.h"
+#include "renderer/transport/hit.h"
+#include "renderer/transport/media.h"
+
+namespace braid {
+
+struct PathState {
+  Vec3 origin, direction;
+  Spectrum throughput{1};
+  MediaStack media;
+  int segments = 0;      // traced so far, null interfaces not counted
+  int nullCrossings = 0; // bounds a path through degenerate nested surfaces
+  uint32_t salt = 0;     // of stochastic coverage, one per ray
+  uint64_t key = 0;      // of the path's random numbers
+
+  // The last vertex that scattered, for the weight of light found by the direction sampled there.
+  Vec3 lastPosition{0}, lastNormal{0};
+  bool lastTwoSided = false;
+  float lastPdfW = 0;
+  bool lightCouldNotBeSampled = true;  // camera, delta scattering, or a null interface crossed since
+
+  float etaScale = 1;         // undoes the radiance compression of refraction in Russian roulette
+  bool featuresDone = false;  // the first non-specular vertex is behind
+  float featureDistance = 0;  // metres travelled up to it
+};
+
+}  // namespace braid

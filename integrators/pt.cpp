@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// Path tracing: one camera path per pixel and pass, random numbers of its own for every pixel.
+#include "integrators/path_kernel.h"
+#include "integrators/registry.h"
+#include "integrators/tiles.h"
+
+namespace braid {
+
+namespace {
+
+constexpr uint64_t kStream = 0x7074;
+
+class PathTracer final : public Integrator {
+ public:
+  const char* name() const override { return "pt"; }
+  const char* description() const override { return "path tracing, next-event estimation and BSDF sampling with the power heuristic"; }
+  Applies applies(const SceneTraits&) const override { return {true, "unbiased for every scene"}; }
+
+  bool renderPass(const PassRequest& request, PassTarget& target) const override {
+    const Plan& plan = request.plan;
+    const PassSampler sampler(plan.settings.sampler, plan.settings.seed, kStream, request.pass);
+    return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>* record) {
+      PathKernel kernel(request.context, plan, sampler, record);
+      const int pixels = tile.width() * tile.height();
+      const auto pixelX = [&](int i) { return tile.x0 + i % tile.width(); };
+      const auto pixelY = [&](int i) { return tile.y0 + i / tile.width(); };
+      for (int first = 0; first < pixels; first += PathKernel::kBatch) {
+        const int last = std::min(pixels, first + PathKernel::kBatch);
+        kernel.clear();
+        for (int i = first; i < last; ++i) {
+          const auto pixel = static_cast<uint64_t>(pixelY(i)) * static_cast<uint64_t>(plan.settings.width) + static_cast<uint64_t>(pixelX(i));
+          kernel.start(pixelX(i), pixelY(i), sampler.itemKey(pixel));
+        }
+        kernel.run();
+        for (int i = first; i < last; ++i) storeSample(plan, pixelX(i), pixelY(i), kernel.sample(i - first), target);
+      }
+      return TileCounts{static_cast<uint64_t>(tile.width()) * static_cast<uint64_t>(tile.height()), kernel.rays, kernel.shadowRays};
+    });
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Integrator> make_pt() { return std::make_unique<PathTracer>(); }
+
+}  // namespace braid

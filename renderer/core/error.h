@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Three kinds of error: BRAID_ASSERT = our bug; an Error exception = bad input or a resource that failed; optional = an expected miss.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace braid {
+
+// Process exit codes of the command line (the library itself only throws).
+enum class ExitCode {
+  Ok = 0,
+  Usage = 1,
+  BadInput = 2,
+  OutputFailed = 3,
+  UnsupportedExtension = 4,
+  OutOfMemory = 5,
+  TargetNotReached = 6,
+  Internal = 70,
+  Interrupted = 130,
+};
+
+// One line that names the file, the place in it and the mend; carries the exit code the command line should end with.
+class Error : public std::runtime_error {
+ public:
+  Error(ExitCode code, const std::string& text) : std::runtime_error(text), code_(code) {}
+  ExitCode code() const { return code_; }
+
+ private:
+  ExitCode code_;
+};
+
+// One problem of an input file.
+struct Problem {
+  std::string place;  // JSON pointer such as /meshes/0/primitives/1/indices, or empty for the whole file
+  std::string text;   // what is wrong and how to mend it
+};
+
+// All problems of one scene file, one line each: "FILE: /json/pointer: text".
+class SceneError : public Error {
+ public:
+  SceneError(ExitCode code, std::string file, std::vector<Problem> problems);
+  SceneError(ExitCode code, std::string file, std::string place, std::string text);
+  const std::vector<Problem>& problems() const { return problems_; }
+
+ private:
+  std::vector<Problem> problems_;
+};
+
+[[noreturn]] void assertionFailed(const char* condition, const char* file, int line);
+
+}  // namespace braid
+
+// Checks an invariant of braid's own code; throws Error(Internal) naming the line.
+#define BRAID_ASSERT(condition) ((condition) ? void(0) : ::braid::assertionFailed(#condition, __FILE__, __LINE__))

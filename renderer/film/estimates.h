@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// What combiners, writers and callers see of a render: immutable planes of float means and variances.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "renderer/film/film.h"
+
+namespace braid {
+
+enum class Correlation { Independent, CommonRandomNumbers };
+
+// One integrator's image so far.
+struct Estimate {
+  std::string name;
+  bool unbiased = true;
+  Correlation correlation = Correlation::Independent;
+  uint64_t passes = 0;
+  double seconds = 0;
+  uint64_t rejected = 0;
+  Rgb<float> mean;
+  Rgb<float> half[2];               // A, B
+  std::vector<Rgb<float>> quarter;  // four, or none
+  Rgb<float> variance;              // of the mean
+};
+
+// Mean, halves and variance of the mean of one set of feature planes.
+template <class P>
+struct FeaturePlanes {
+  P mean, half[2], variance;
+};
+
+struct Features {
+  FeaturePlanes<Rgb<float>> albedo, normal;
+  FeaturePlanes<Plane<float>> depth, visibility;
+};
+
+// Metadata written to the EXR header: name and value, in this order.
+struct Attribute {
+  std::string name;
+  enum class Kind { String, Int, Float, Matrix, Chromaticities } kind = Kind::String;
+  std::string text;
+  int64_t integer = 0;
+  double number = 0;
+  std::vector<float> values;  // Matrix: 16, row-major as OpenImageIO wants it; Chromaticities: 8
+};
+
+struct Estimates {
+  int width = 0, height = 0;  // of the planes: the window
+  PixelWindow window;         // the part of the full frame that the planes hold
+  int fullWidth = 0, fullHeight = 0;
+  uint64_t seed = 0;
+  std::vector<Estimate> estimates;
+  std::optional<Features> features;
+  std::vector<Attribute> attributes;
+
+  const Estimate* find(const std::string& name) const {
+    for (const Estimate& e : estimates)
+      if (e.name == name) return &e;
+    return nullptr;
+  }
+};
+
+}  // namespace braid

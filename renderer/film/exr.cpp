@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/film/exr.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <OpenImageIO/imageio.h>
+
+#include "renderer/core/error.h"
+#include "renderer/core/parallel.h"
+#include "renderer/film/output_file.h"
+
+namespace braid {
+
+namespace {
+
+constexpr float kHalfMax = 65504;
+// Rows written at once: several ZIP blocks of 16 rows, so that OpenEXR compresses them in parallel.
+constexpr int kRowsPerWrite = 64;
+
+struct Channel {
+  std::string name;
+  const Plane<float>* plane;
+  bool half = false;
+};
+
+using Names = std::array<const char*, 3>;
+constexpr Names kColour = {"R", "G", "B"};
+constexpr Names kVector = {"X", "Y", "Z"};
+
+// The channels of a file, all of one size.
+class ChannelList {
+ public:
+  ChannelList(int width, int height, std::string prefix) : width_(width), height_(height), prefix_(std::move(prefix)) {
+    if (!prefix_.empty()) prefix_ += '.';
+  }
+
+  void addHeadline(const char* name, const Plane<float>& plane, bool half) {
+    check(plane);
+    list_.push_back({name, &plane, half});
+  }
+  // Layers without planes are left out: not every estimate has quarters.
+  void add(const std::string& name, const Plane<float>& plane) {
+    if (plane.empty()) return;
+    check(plane);
+    list_.push_back({prefix_ + name, &plane});
+  }
+  void add(const std::string& layer, const Names& names, const Rgb<float>& planes) {
+    for (size_t c = 0; c < 3; ++c) add(layer + "." + names[c], planes[c]);
+  }
+  void add(const std::string& layer, const char* name, const Plane<float>& plane) { add(layer + "." + name, plane); }
+
+  const std::vector<Channel>& list() const { return list_; }
+
+ private:
+  void check(const Plane<float>& plane) const { BRAID_ASSERT(plane.width == width_ && plane.height == height_); }
+
+  int width_, height_;
+  std::string prefix_;
+  std::vector<Channel> list_;
+};
+
+template <class P, class N>
+void addFeature(ChannelList& channels, const std::string& layer, const N& names, const FeaturePlanes<P>& f, bool all) {
+  channels.add(layer, names, f.mean);
+  if (!all) return;
+  channels.add(layer + "A", names, f.half[0]);
+  channels.add(layer + "B", names, f.half[1]);
+  channels.add(layer + "Variance", names, f.variance);
+}
+
+void addEstimate(ChannelList& channels, const Estimate& e, bool quarters) {
+  channels.add(e.name + ".mean", kColour, e.mean);
+  channels.add(e.name + ".halfA", kColour, e.half[0]);
+  channels.add(e.name + ".halfB", kColour, e.half[1]);
+  channels.add(e.name + ".variance", kColour, e.variance);
+  if (!quarters) return;
+  for (size_t q = 0; q < e.quarter.size(); ++q) channels.add(e.name + ".q" + std::to_string(q), kColour, e.quarter[q]);
+}
+
+ChannelList collectChannels(const Estimates& estimates, const Rgb<float>& headline, const Plane<float>* alpha,
+                            const ExrOptions& options) {
+  ChannelList channels(headline.width(), headline.height(), options.layerPrefix);
+  const bool half = !options.floatHeadline;
+  for (size_t c = 0; c < 3; ++c) channels.addHeadline(kColour[c], headline[c], half);
+  if (alpha) channels.addHeadline("A", *alpha, half);
+  const bool all = options.aovs == AovSet::All;
+  if (options.aovs != AovSet::None && estimates.features) {
+    const Features& f = *estimates.features;
+    addFeature(channels, "Albedo", kColour, f.albedo, all);
+    addFeature(channels, "N", kVector, f.normal, all);
+    addFeature(channels, "Depth", "Z", f.depth, all);
+    addFeature(channels, "Visibility", "V", f.visibility, all);
+  }
+  if (!all) return channels;
+  for (const Estimate& e : estimates.estimates) addEstimate(channels, e, options.quarters);
+  for (const ExrLayer& layer : options.layers)
+    if (layer.planes) channels.add(layer.name, kColour, *layer.planes);
+  return channels;
+}
+
+void addAttribute(OIIO::ImageSpec& spec, const Attribute& a) {
+  using OIIO::TypeDesc;
+  switch (a.kind) {
+    case Attribute::Kind::String:
+      spec.attribute(a.name, a.text);
+      break;
+    case Attribute::Kind::Int:
+      // EXR integers have 32 bits; a larger one (a seed, a count of samples) is kept exactly, as text.
+      if (a.integer >= std::numeric_limits<int>::min() && a.integer <= std::numeric_limits<int>::max())
+        spec.attribute(a.name, static_cast<int>(a.integer));
+      else
+        spec.attribute(a.name, std::to_string(a.integer));
+      break;
+    case Attribute::Kind::Float:
+      spec.attribute(a.name, static_cast<float>(a.number));
+      break;
+    case Attribute::Kind::Matrix:
+      BRAID_ASSERT(a.values.size() == 16);
+      spec.attribute(a.name, TypeDesc::TypeMatrix, a.values.data());
+      break;
+    case Attribute::Kind::Chromaticities:
+      BRAID_ASSERT(a.values.size() == 8);
+      spec.attribute(a.name, TypeDesc(TypeDesc::FLOAT, 8), a.values.data());
+      break;
+  }
+}
+
+OIIO::ImageSpec makeSpec(const Estimates& estimates, const std::vector<Channel>& channels) {
+  using OIIO::TypeDesc;
+  const int width = channels[0].plane->width, height = channels[0].plane->height;
+  OIIO::ImageSpec spec(width, height, static_cast<int>(channels.size()), TypeDesc::FLOAT);
+  spec.channelnames.clear();
+  for (const Channel& c : channels) {
+    spec.channelnames.push_back(c.name);
+    spec.channelformats.push_back(c.half ? TypeDesc::HALF : TypeDesc::FLOAT);
+    if (c.name == "A") spec.alpha_channel = static_cast<int>(spec.channelnames.size()) - 1;
+  }
+  if (estimates.window.width() > 0) {
+    BRAID_ASSERT(estimates.window.width() == width && estimates.window.height() == height);
+    spec.x = estimates.window.x0;
+    spec.y = estimates.window.y0;
+  }
+  spec.full_width = estimates.fullWidth > 0 ? estimates.fullWidth : width;
+  spec.full_height = estimates.fullHeight > 0 ? estimates.fullHeight : height;
+
+  spec.attribute("compression", "zip");
+  // OpenImageIO adds the date of writing when there is none; files must reproduce byte for byte, and an empty date is
+  // the way to have none.
+  spec.attribute("DateTime", "");
+  const float rec709[8] = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};  // R, G, B, white D65: x, y
+  spec.attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), rec709);
+  spec.attribute("colorInteropID", "lin_rec709_scene");
+  spec.attribute("braid/varianceIs", "variance of the pixel mean");
+  for (const Attribute& a : estimates.attributes) addAttribute(spec, a);
+  return spec;
+}
+
+// Copies rows [begin, end) of all planes, interleaved; returns how many values had to be clamped to the range of half
+// floats.
+uint64_t interleave(const std::vector<Channel>& channels, int begin, int end, std::vector<float>& out) {
+  std::atomic<uint64_t> clamped{0};
+  const size_t count = channels.size(), width = static_cast<size_t>(channels[0].plane->width);
+  parallelRows(end - begin, [&](int row) {
+    uint64_t clampedInRow = 0;
+    for (size_t c = 0; c < count; ++c) {
+      const float* in = &channels[c].plane->at(0, begin + row);
+      float* to = out.data() + static_cast<size_t>(row) * width * count + c;
+      for (size_t x = 0; x < width; ++x) {
+        float v = in[x];
+        if (channels[c].half && std::fabs(v) > kHalfMax) {
+          v = std::copysign(kHalfMax, v);
+          ++clampedInRow;
+        }
+        to[x * count] = v;
+      }
+    }
+    clamped += clampedInRow;
+  });
+  return clamped;
+}
+
+}  // namespace
+
+WriteReport writeExr(const std::string& path, const Estimates& estimates, const Rgb<float>& headline,
+                     const Plane<float>* alpha, const ExrOptions& options) {
+  BRAID_ASSERT(!headline.empty());
+  const ChannelList list = collectChannels(estimates, headline, alpha, options);
+  const std::vector<Channel>& channels = list.list();
+  const OIIO::ImageSpec spec = makeSpec(estimates, channels);
+
+  OutputFile file(path, ".exr");
+  WriteReport report;
+  {
+    const auto out = OIIO::ImageOutput::create("exr");
+    if (!out) file.fail(OIIO::geterror());
+    if (!out->set_ioproxy(&file)) file.fail("this OpenImageIO cannot write EXR through a stream");
+    if (!out->open(file.temporaryPath(), spec)) file.fail(out->geterror());
+    std::vector<float> rows(static_cast<size_t>(kRowsPerWrite) * static_cast<size_t>(spec.width) * channels.size());
+    for (int y = 0; y < spec.height; y += kRowsPerWrite) {
+      const int end = std::min(spec.height, y + kRowsPerWrite);
+      report.clampedToHalf += interleave(channels, y, end, rows);
+      if (!out->write_scanlines(spec.y + y, spec.y + end, 0, OIIO::TypeDesc::FLOAT, rows.data()))
+        file.fail(out->geterror());
+    }
+    if (!out->close()) file.fail(out->geterror());
+  }
+  file.finish();
+  return report;
+}
+
+}  // namespace braid

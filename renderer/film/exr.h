@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// OpenEXR files with the channel names of the field (Nuke, Blender, tev, oiiotool read them); written to a temporary
+// file, then renamed.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "renderer/core/plane.h"
+#include "renderer/film/estimates.h"
+
+namespace braid {
+
+enum class AovSet { None, Features, All };
+
+// One more colour layer to write beside the estimates, such as "Error" or "combined.js".
+struct ExrLayer {
+  std::string name;
+  const Rgb<float>* planes = nullptr;
+};
+
+struct ExrOptions {
+  AovSet aovs = AovSet::All;
+  bool quarters = false;         // also <estimate>.q0 … q3
+  bool floatHeadline = false;    // R G B as float instead of half
+  std::string layerPrefix;       // e.g. "ViewLayer": put before every channel but R G B A
+  std::vector<ExrLayer> layers;  // written with AovSet::All
+};
+
+struct WriteReport {
+  uint64_t clampedToHalf = 0;  // headline values above 65504
+};
+
+// Writes R G B (and A when `alpha` is not null) = headline, features, and the statistics planes of every estimate.
+// Throws Error(OutputFailed) with a one-line reason; the previous file is left intact then.
+WriteReport writeExr(const std::string& path, const Estimates& estimates, const Rgb<float>& headline,
+                     const Plane<float>* alpha, const ExrOptions& options);
+
+// Any image file OpenImageIO reads: planes by channel name, in float and linear (integer formats are decoded from
+// sRGB). The parts of a multi-part EXR are merged: a channel name that repeats gets the part's name as a prefix. Throws
+// Error(BadInput).
+struct ImageFile {
+  std::string path;
+  int width = 0, height = 0;
+  PixelWindow window;  // where the pixels lie in the full frame
+  int fullWidth = 0, fullHeight = 0;
+  std::vector<std::string> channelNames;
+  std::map<std::string, Plane<float>> planes;
+  std::vector<Attribute> attributes;
+  // The planes prefix.R prefix.G prefix.B (or R G B for an empty prefix; X Y Z serve too; a single plane such as Y is
+  // replicated). Throws Error(BadInput) naming what is missing and which layers there are.
+  Rgb<float> rgb(const std::string& prefix = "") const;
+};
+ImageFile readImage(const std::string& path);
+
+// Whether the file holds the layer, in one of the forms that rgb() takes.
+bool hasLayer(const ImageFile& file, const std::string& prefix);
+
+// Tone-mapped 8-bit PNG: exposure in stops, then sRGB with values clamped to [0,1].
+void writePng(const std::string& path, const Rgb<float>& image, float exposureStops = 0);
+
+}  // namespace braid

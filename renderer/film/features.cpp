@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <utility>
+
+#include "renderer/core/error.h"
+#include "renderer/core/parallel.h"
+#include "renderer/film/film.h"
+#include "renderer/film/moments.h"
+
+namespace braid {
+
+namespace {
+
+using Planes = std::vector<Plane<double>>;
+
+Plane<float> ratio(const Plane<double>& a, const Plane<double>* b, uint64_t n) {
+  Plane<float> out(a.width, a.height);
+  if (n == 0) return out;
+  parallelChunks(a.size(), 4096, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i)
+      out[i] = static_cast<float>((a[i] + (b ? (*b)[i] : 0.0)) / static_cast<double>(n));
+  });
+  return out;
+}
+
+}  // namespace
+
+FeatureAccumulator::FeatureAccumulator(int width, int height)
+    : sum_{Planes(FeatureSample::kComponents, Plane<double>(width, height)),
+           Planes(FeatureSample::kComponents, Plane<double>(width, height))},
+      sumsq_(FeatureSample::kComponents, Plane<double>(width, height)) {}
+
+FeatureAccumulator FeatureAccumulator::fromSums(Planes sumsA, Planes sumsB, Planes sumsOfSquares, uint64_t passesA,
+                                                uint64_t passesB) {
+  BRAID_ASSERT(sumsOfSquares.size() == FeatureSample::kComponents);
+  for (const Planes* planes : {&sumsA, &sumsB, &sumsOfSquares}) {
+    BRAID_ASSERT(planes->size() == sumsOfSquares.size());
+    for (const Plane<double>& p : *planes)
+      BRAID_ASSERT(p.width == sumsOfSquares[0].width && p.height == sumsOfSquares[0].height);
+  }
+  FeatureAccumulator f(0, 0);
+  f.sum_[0] = std::move(sumsA);
+  f.sum_[1] = std::move(sumsB);
+  f.sumsq_ = std::move(sumsOfSquares);
+  f.count_[0] = passesA;
+  f.count_[1] = passesB;
+  return f;
+}
+
+void FeatureAccumulator::commit(uint64_t pass, const PassTarget& target) {
+  BRAID_ASSERT(target.wantsFeatures() && target.width_ == sumsq_[0].width && target.height_ == sumsq_[0].height);
+  const size_t half = pass % 2;
+  const auto width = static_cast<size_t>(target.width_);
+  parallelRows(target.height_, [&](int y) {
+    const size_t begin = static_cast<size_t>(y) * width;
+    for (size_t c = 0; c < FeatureSample::kComponents; ++c) {
+      const float* __restrict in = target.features_[c].data.data() + begin;
+      double* __restrict sum = sum_[half][c].data.data() + begin;
+      double* __restrict sumsq = sumsq_[c].data.data() + begin;
+      for (size_t x = 0; x < width; ++x) {
+        const double v = static_cast<double>(in[x]);
+        sum[x] += v;
+        sumsq[x] += v * v;
+      }
+    }
+  });
+  ++count_[half];
+}
+
+Plane<float> FeatureAccumulator::mean(int component) const {
+  const auto c = static_cast<size_t>(component);
+  return ratio(sum_[0][c], &sum_[1][c], passes());
+}
+
+Plane<float> FeatureAccumulator::halfMean(int component, int half) const {
+  return ratio(sum_[half][static_cast<size_t>(component)], nullptr, count_[half]);
+}
+
+Plane<float> FeatureAccumulator::variance(int component) const {
+  const auto c = static_cast<size_t>(component);
+  const Plane<double>& a = sum_[0][c];
+  Plane<float> out(a.width, a.height);
+  parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i)
+      out[i] = static_cast<float>(varianceOfMean(a[i] + sum_[1][c][i], sumsq_[c][i], passes()));
+  });
+  return out;
+}
+
+}  // namespace braid

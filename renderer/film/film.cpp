@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/film/film.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "renderer/core/error.h"
+#include "renderer/core/parallel.h"
+#include "renderer/film/box_sum.h"
+#include "renderer/film/moments.h"
+
+namespace braid {
+
+namespace {
+
+// Radius of the box that compares the two variance estimates: 21 x 21 pixels (ALGORITHMS 4.6 step 1).
+constexpr int kVarianceBoxRadius = 10;
+
+bool acceptable(const Spectrum& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z) && !(v.x < 0 || v.y < 0 || v.z < 0);
+}
+
+void commitRow(const float* __restrict own, double* __restrict sum, double* __restrict sumsq, size_t width) {
+  for (size_t x = 0; x < width; ++x) {
+    const double v = static_cast<double>(own[x]);
+    sum[x] += v;
+    sumsq[x] += v * v;
+  }
+}
+
+// `splats` is interleaved: 3 values a pixel. The sum is rounded to float so that a pass value has one type everywhere.
+// A negative splat sum can only be an overflow (more than 512 clamped splats in one pixel): the pixel then has the
+// largest value there is.
+void commitRow(const float* __restrict own, const int64_t* __restrict splats, double unit, double* __restrict sum,
+               double* __restrict sumsq, size_t width) {
+  for (size_t x = 0; x < width; ++x) {
+    const int64_t fixed = splats[3 * x];
+    const double splat = fixed < 0 ? 0x1p63 : static_cast<double>(fixed);
+    const double v = static_cast<double>(static_cast<float>(static_cast<double>(own[x]) + splat * unit));
+    sum[x] += v;
+    sumsq[x] += v * v;
+  }
+}
+
+}  // namespace
+
+PassTarget::PassTarget(int width, int height, bool splats, bool features)
+    : width_(width), height_(height), own_(width, height) {
+  if (splats) splats_.assign(3 * own_.size(), 0);
+  if (features) features_.assign(FeatureSample::kComponents, Plane<float>(width, height));
+}
+
+bool PassTarget::add(int x, int y, const Spectrum& value) {
+  const size_t i = own_[0].index(x, y);
+  const bool ok = acceptable(value);
+  own_.set(i, ok ? value : Spectrum(0));
+  if (!ok) rejected_.fetch_add(1, std::memory_order_relaxed);
+  return ok;
+}
+
+bool PassTarget::splat(int x, int y, const Spectrum& value) {
+  BRAID_ASSERT(!splats_.empty() && x >= 0 && y >= 0 && x < width_ && y < height_);
+  if (!acceptable(value)) {
+    rejected_.fetch_add(1, std::memory_order_relaxed);
+    return false;
+  }
+  int64_t* pixel = &splats_[3 * own_[0].index(x, y)];
+  bool clamped = false;
+  for (int c = 0; c < 3; ++c) {
+    const double v = static_cast<double>(value[c]);
+    if (v == 0) continue;
+    clamped |= v > splatClamp_;
+    const auto fixed = static_cast<int64_t>(std::llrint(std::min(v, splatClamp_) * splatScale_));
+    std::atomic_ref<int64_t>(pixel[c]).fetch_add(fixed, std::memory_order_relaxed);
+  }
+  if (clamped) clampedSplats_.fetch_add(1, std::memory_order_relaxed);
+  return true;
+}
+
+void PassTarget::setSplatFractionBits(int bits) {
+  splatScale_ = std::ldexp(1.0, bits);
+  splatClamp_ = std::ldexp(1.0, 54 - bits);
+}
+
+void PassTarget::features(int x, int y, const FeatureSample& sample) {
+  const size_t i = own_[0].index(x, y);
+  const float values[FeatureSample::kComponents] = {sample.albedo.x, sample.albedo.y,  sample.albedo.z,
+                                                    sample.normal.x, sample.normal.y,  sample.normal.z,
+                                                    sample.depth,    sample.visibility};
+  // A non-finite component would poison every window around it: it counts as 0, and the sample as rejected.
+  bool ok = true;
+  for (size_t c = 0; c < FeatureSample::kComponents; ++c) {
+    const bool finite = std::isfinite(values[c]);
+    ok &= finite;
+    features_[c][i] = finite ? values[c] : 0.0f;
+  }
+  if (!ok) rejected_.fetch_add(1, std::memory_order_relaxed);
+}
+
+void PassTarget::clear() {
+  const auto width = static_cast<size_t>(width_);
+  parallelRows(height_, [&](int y) {
+    const size_t begin = static_cast<size_t>(y) * width;
+    for (size_t c = 0; c < 3; ++c) std::fill_n(own_[c].data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
+    for (Plane<float>& f : features_) std::fill_n(f.data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
+    if (!splats_.empty()) std::fill_n(splats_.begin() + static_cast<std::ptrdiff_t>(3 * begin), 3 * width, int64_t(0));
+  });
+  rejected_ = 0;
+  clampedSplats_ = 0;
+}
+
+Accumulator::Accumulator(int width, int height, int buckets)
+    : width_(width),
+      height_(height),
+      sum_(static_cast<size_t>(buckets), Rgb<double>(width, height)),
+      sumsq_(width, height),
+      count_(static_cast<size_t>(buckets), 0) {
+  BRAID_ASSERT(buckets >= 2 && buckets % 2 == 0);
+}
+
+Accumulator Accumulator::fromSums(std::vector<Rgb<double>> sums, Rgb<double> sumOfSquares, std::vector<uint64_t> counts,
+                                  uint64_t rejected, uint64_t clampedSplats) {
+  Accumulator a(0, 0, static_cast<int>(sums.size()));
+  BRAID_ASSERT(counts.size() == sums.size());
+  for (const Rgb<double>& s : sums)
+    BRAID_ASSERT(s.width() == sumOfSquares.width() && s.height() == sumOfSquares.height());
+  a.width_ = sumOfSquares.width();
+  a.height_ = sumOfSquares.height();
+  a.sum_ = std::move(sums);
+  a.sumsq_ = std::move(sumOfSquares);
+  a.count_ = std::move(counts);
+  a.rejected_ = rejected;
+  a.clampedSplats_ = clampedSplats;
+  return a;
+}
+
+void Accumulator::commit(uint64_t pass, const PassTarget& target) {
+  BRAID_ASSERT(target.width_ == width_ && target.height_ == height_);
+  const size_t bucket = pass % count_.size();
+  Rgb<double>& sum = sum_[bucket];
+  const auto width = static_cast<size_t>(width_);
+  const double unit = 1 / target.splatScale_;
+  parallelRows(height_, [&](int y) {
+    const size_t begin = static_cast<size_t>(y) * width;
+    for (size_t c = 0; c < 3; ++c) {
+      const float* own = target.own_[c].data.data() + begin;
+      double* s = sum[c].data.data() + begin;
+      double* q = sumsq_[c].data.data() + begin;
+      if (target.splats_.empty())
+        commitRow(own, s, q, width);
+      else
+        commitRow(own, target.splats_.data() + 3 * begin + c, unit, s, q, width);
+    }
+  });
+  ++count_[bucket];
+  rejected_ += target.rejected();
+  clampedSplats_ += target.clampedSplats();
+}
+
+uint64_t Accumulator::passes() const {
+  uint64_t n = 0;
+  for (uint64_t c : count_) n += c;
+  return n;
+}
+
+Rgb<float> Accumulator::meanOfBuckets(int first, int step) const {
+  std::vector<const Rgb<double>*> used;
+  uint64_t n = 0;
+  for (size_t k = static_cast<size_t>(first); k < count_.size(); k += static_cast<size_t>(step)) {
+    n += count_[k];
+    used.push_back(&sum_[k]);
+  }
+  Rgb<float> out(width_, height_);
+  if (n == 0) return out;
+  const auto width = static_cast<size_t>(width_);
+  parallelRows(height_, [&](int y) {
+    const size_t begin = static_cast<size_t>(y) * width;
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t i = begin; i < begin + width; ++i) {
+        double total = 0;
+        for (const Rgb<double>* s : used) total += (*s)[c][i];
+        out[c][i] = static_cast<float>(total / static_cast<double>(n));
+      }
+  });
+  return out;
+}
+
+Rgb<float> Accumulator::mean() const { return meanOfBuckets(0, 1); }
+Rgb<float> Accumulator::bucketMean(int k) const { return meanOfBuckets(k, bucketCount()); }
+Rgb<float> Accumulator::halfMean(int half) const { return meanOfBuckets(half, 2); }
+
+Rgb<float> Accumulator::passVariance() const {
+  Rgb<float> out(width_, height_);
+  const uint64_t n = passes();
+  const auto width = static_cast<size_t>(width_);
+  parallelRows(height_, [&](int y) {
+    const size_t begin = static_cast<size_t>(y) * width;
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t i = begin; i < begin + width; ++i) {
+        double total = 0;
+        for (const Rgb<double>& s : sum_) total += s[c][i];
+        out[c][i] = static_cast<float>(varianceOfMean(total, sumsq_[c][i], n));
+      }
+  });
+  return out;
+}
+
+// With K buckets that have passes, w_k = n_k / n and bucket means m_k: h = Σ w_k (m_k - mean)² / (K - 1). Unbiased when
+// the variance of a bucket's mean goes as 1 / n_k; exactly Σ (m_k - mean)² / (K (K - 1)) for equal counts.
+Plane<double> Accumulator::bucketVariance(size_t channel) const {
+  std::vector<size_t> used;
+  double n = 0;
+  for (size_t k = 0; k < count_.size(); ++k)
+    if (count_[k] > 0) {
+      used.push_back(k);
+      n += static_cast<double>(count_[k]);
+    }
+  Plane<double> out(width_, height_);
+  const auto width = static_cast<size_t>(width_);
+  parallelRows(height_, [&](int y) {
+    const size_t begin = static_cast<size_t>(y) * width;
+    for (size_t i = begin; i < begin + width; ++i) {
+      double total = 0, spread = 0;
+      for (size_t k : used) total += sum_[k][channel][i];
+      for (size_t k : used) {
+        const auto nk = static_cast<double>(count_[k]);
+        spread += nk / n * sqr(sum_[k][channel][i] / nk - total / n);
+      }
+      out[i] = spread / static_cast<double>(used.size() - 1);
+    }
+  });
+  return out;
+}
+
+Rgb<float> Accumulator::variance(bool lowDiscrepancy) const {
+  Rgb<float> out = passVariance();
+  const auto filled = std::count_if(count_.begin(), count_.end(), [](uint64_t n) { return n > 0; });
+  const bool single = *std::max_element(count_.begin(), count_.end()) <= 1;
+  if (!lowDiscrepancy || filled < 2 || single) return out;
+  // Analysis of variance: the spread between K buckets is part of the spread of all n passes, so the ratio cannot
+  // exceed this.
+  const double ratioLimit = static_cast<double>(passes() - 1) / static_cast<double>(filled - 1);
+  for (size_t c = 0; c < 3; ++c) {
+    // Both boxes hold the same number of pixels, so sums do instead of averages; and sums of non-negative values, never
+    // differences of running sums, so that a zero box is exactly zero and nothing absolute has to guard the division.
+    const Plane<double> between = boxSum(bucketVariance(c), kVarianceBoxRadius);
+    const Plane<double> within = boxSum(out[c], kVarianceBoxRadius);
+    parallelChunks(out[c].size(), 4096, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        const double ratio = within[i] > 0 ? std::min(between[i] / within[i], ratioLimit) : 0.0;
+        out[c][i] = static_cast<float>(static_cast<double>(out[c][i]) * ratio);
+      }
+    });
+  }
+  return out;
+}
+
+}  // namespace braid

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+// The film: PassTarget receives one pass of one integrator, Accumulator turns passes into means, buckets and variances.
+//
+// "Variance" is the variance of the pixel mean, computed over pass values, so that splats, photons, environment pixels
+// and rejected samples are in it for every integrator (Veach-style per-sample statistics would miss the splats).
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include "renderer/core/plane.h"
+
+namespace braid {
+
+// A window of the full frame, in pixels: [x0, x1) × [y0, y1).
+struct PixelWindow {
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  int width() const { return x1 - x0; }
+  int height() const { return y1 - y0; }
+  bool operator==(const PixelWindow&) const = default;
+};
+
+// Features of the first non-specular vertex of a camera path (ALGORITHMS 0): 8 components, planes in this order.
+struct FeatureSample {
+  Spectrum albedo{0};
+  Vec3 normal{0};
+  float depth = 0;
+  float visibility = 0;
+  static constexpr int kComponents = 8;
+};
+
+// What an integrator writes during one pass. add() and features() belong to the task that owns the pixel; splat() may
+// be called by any thread for any pixel: integer sums commute, so the result does not depend on the order.
+class PassTarget {
+ public:
+  PassTarget(int width, int height, bool splats, bool features);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  bool wantsFeatures() const { return !features_.empty(); }
+
+  // Sets the value of the task's own pixel in this pass. A non-finite or negative value counts as a sample of value 0
+  // and is counted as rejected; returns false then.
+  bool add(int x, int y, const Spectrum& value);
+  // Adds to any pixel in fixed point (2⁻³², clamped at 2²² and counted). Returns false when rejected.
+  bool splat(int x, int y, const Spectrum& value);
+  // Moves the fixed point: unit 2^-bits, clamp at 2^(54-bits); 512 clamped splats fit one pixel and pass. Scenes in
+  // physical light units choose `bits` once from their total light power, so that scaling all lights scales the image
+  // and nothing else. Default 32; call before the first splat of a pass.
+  void setSplatFractionBits(int bits);
+  void features(int x, int y, const FeatureSample& sample);
+
+  // Zeroes everything, for the next pass; keeps the allocation.
+  void clear();
+  uint64_t rejected() const { return rejected_.load(); }
+  uint64_t clampedSplats() const { return clampedSplats_.load(); }
+
+ private:
+  friend class Accumulator;
+  friend class FeatureAccumulator;
+
+  int width_, height_;
+  Rgb<float> own_;
+  std::vector<int64_t> splats_;         // 3 per pixel, interleaved; empty when the integrator does not splat
+  std::vector<Plane<float>> features_;  // FeatureSample::kComponents planes, or empty
+  double splatScale_ = 4294967296.0;    // fixed-point units per 1
+  double splatClamp_ = 4194304.0;
+  std::atomic<uint64_t> rejected_{0}, clampedSplats_{0};
+};
+
+// Sums of one integrator's passes. Bucket of a pass = pass % bucketCount(); half A = even buckets, B = odd ones. All
+// pixels have the same count. 120 bytes a pixel with four buckets, 72 with two.
+class Accumulator {
+ public:
+  Accumulator(int width, int height, int buckets);
+
+  // Adds the pass: v = own + splats, sum[pass % K] += v, sumsq += v². Parallel over rows.
+  void commit(uint64_t pass, const PassTarget& target);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  int bucketCount() const { return static_cast<int>(count_.size()); }
+  uint64_t passes() const;
+  uint64_t passesInBucket(int k) const { return count_[static_cast<size_t>(k)]; }
+  uint64_t rejected() const { return rejected_; }
+  uint64_t clampedSplats() const { return clampedSplats_; }
+
+  Rgb<float> mean() const;
+  Rgb<float> bucketMean(int k) const;   // zero where the bucket is empty
+  Rgb<float> halfMean(int half) const;  // 0 = A, 1 = B
+  // Variance of the mean from pass values: (sumsq/n - mean²)/(n - 1), never negative; zero for n < 2. Conservative when
+  // passes of a bucket share a low-discrepancy sequence.
+  Rgb<float> passVariance() const;
+  // The calibrated variance of the mean. `lowDiscrepancy` false: passVariance(). True: passVariance() rescaled by the
+  // ratio of 21x21 box averages of the variance between buckets (independent scrambles) to passVariance()
+  // (ALGORITHMS 4.6 step 1); buckets of unequal counts are weighted.
+  Rgb<float> variance(bool lowDiscrepancy) const;
+
+  // Raw sums, for state files: what a file holds, and back.
+  const std::vector<Rgb<double>>& sums() const { return sum_; }
+  const Rgb<double>& sumOfSquares() const { return sumsq_; }
+  static Accumulator fromSums(std::vector<Rgb<double>> sums, Rgb<double> sumOfSquares, std::vector<uint64_t> counts,
+                              uint64_t rejected, uint64_t clampedSplats);
+
+ private:
+  Rgb<float> meanOfBuckets(int first, int step) const;
+  // Variance of the mean from the spread of the bucket means (independent scrambles).
+  Plane<double> bucketVariance(size_t channel) const;
+  int width_, height_;
+  std::vector<Rgb<double>> sum_;
+  Rgb<double> sumsq_;
+  std::vector<uint64_t> count_;
+  uint64_t rejected_ = 0, clampedSplats_ = 0;
+};
+
+// Mean, halves and variance of the mean of the features, kept once per render (they do not depend on the integrator).
+class FeatureAccumulator {
+ public:
+  FeatureAccumulator(int width, int height);
+  void commit(uint64_t pass, const PassTarget& target);
+  uint64_t passes() const { return count_[0] + count_[1]; }
+  Plane<float> mean(int component) const;
+  Plane<float> halfMean(int component, int half) const;
+  Plane<float> variance(int component) const;
+
+  // Raw sums, for state files: what a file holds, and back.
+  uint64_t passesInHalf(int half) const { return count_[half]; }
+  const std::vector<Plane<double>>& sums(int half) const { return sum_[half]; }
+  const std::vector<Plane<double>>& sumsOfSquares() const { return sumsq_; }
+  static FeatureAccumulator fromSums(std::vector<Plane<double>> sumsA, std::vector<Plane<double>> sumsB,
+                                     std::vector<Plane<double>> sumsOfSquares, uint64_t passesA, uint64_t passesB);
+
+ private:
+  std::vector<Plane<double>> sum_[2];  // per half, per component
+  std::vector<Plane<double>> sumsq_;
+  uint64_t count_[2] = {0, 0};
+};
+
+}  // namespace braid

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// The variance of a mean from a sum and a sum of squares.
+#pragma once
+
+#include <cstdint>
+
+namespace braid {
+
+// (Σv²/n - mean²)/(n - 1), never negative; zero for n < 2. What the rounding of n additions in double can produce by
+// itself (n 2⁻⁵³ mean², a relative standard deviation of 8e-8 of one pass at 64 passes and 3e-5 at 10⁷) counts as zero,
+// so that a constant has no variance.
+inline double varianceOfMean(double sum, double sumOfSquares, uint64_t n) {
+  if (n < 2) return 0;
+  const auto count = static_cast<double>(n);
+  const double meanSquare = (sum / count) * (sum / count);
+  const double spread = sumOfSquares / count - meanSquare;
+  const double rounding = count * 0x1p-53 * meanSquare;
+  return spread > rounding ? spread / (count - 1) : 0.0;
+}
+
+}  // namespace braid

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/film/output_file.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+
+#include <unistd.h>
+
+#include "renderer/core/error.h"
+
+namespace braid {
+
+namespace {
+
+std::string mendFor(int error) {
+  switch (error) {
+    case ENOSPC:
+    case EDQUOT:
+    case EFBIG:
+      return "free some space, or write elsewhere";
+    case ENOENT:
+    case ENOTDIR:
+      return "create the folder first, or write elsewhere";
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return "check the permissions of the folder, or write elsewhere";
+    case EISDIR:
+      return "give a file name, not a folder";
+    default:
+      return "check the disk, or write elsewhere";
+  }
+}
+
+}  // namespace
+
+OutputFile::OutputFile(const std::string& path, const std::string& extension)
+    : IOProxy(path, IOProxy::Write),
+      target_(path),
+      temporary_(path + ".tmp-" + std::to_string(::getpid()) + extension) {
+  errno = 0;
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored))
+    error_ = EISDIR;
+  else
+    note((file_ = std::fopen(temporary_.c_str(), "wb")) != nullptr);
+  if (error_ != 0) fail("");
+}
+
+OutputFile::~OutputFile() {
+  if (file_) std::fclose(file_);
+  if (!temporary_.empty()) {
+    std::error_code ignored;
+    std::filesystem::remove(temporary_, ignored);
+  }
+}
+
+void OutputFile::fail(const std::string& reason) const {
+  std::string line = error_ != 0 ? std::strerror(error_) : reason;
+  for (char& c : line)
+    if (c == '\n' || c == '\r') c = ' ';
+  throw Error(ExitCode::OutputFailed, target_ + ": cannot be written: " + line + "; " + mendFor(error_));
+}
+
+void OutputFile::note(bool ok) {
+  if (!ok && error_ == 0) error_ = errno != 0 ? errno : EIO;
+}
+
+void OutputFile::finish() {
+  errno = 0;
+  const bool closed = std::fclose(file_) == 0;
+  file_ = nullptr;
+  note(closed);
+  if (error_ == 0) note(std::rename(temporary_.c_str(), target_.c_str()) == 0);
+  if (error_ != 0) fail("");
+  temporary_.clear();
+}
+
+size_t OutputFile::write(const void* data, size_t size) {
+  errno = 0;
+  const size_t written = std::fwrite(data, 1, size, file_);
+  note(written == size);
+  position_ += static_cast<int64_t>(written);
+  size_ = std::max(size_, position_);
+  return written;
+}
+
+size_t OutputFile::pwrite(const void* data, size_t size, int64_t offset) {
+  const int64_t here = position_;
+  if (!seek(offset)) return 0;
+  const size_t written = write(data, size);
+  seek(here);
+  return written;
+}
+
+bool OutputFile::seek(int64_t offset) {
+  if (offset == position_) return true;
+  errno = 0;
+  const bool ok = ::fseeko(file_, offset, SEEK_SET) == 0;
+  note(ok);
+  if (ok) position_ = offset;
+  return ok;
+}
+
+int64_t OutputFile::tell() { return position_; }
+
+}  // namespace braid

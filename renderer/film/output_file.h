@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// A file that appears under its name only when it is complete.
+#pragma once
+
+#include <cstdio>
+#include <string>
+
+#include <OpenImageIO/filesystem.h>
+
+namespace braid {
+
+// Writes to "path.tmp-PID.EXT" in the same folder; finish() renames it to `path`. Without finish() the temporary file
+// is removed and a previous file stays intact. OpenImageIO's writers do not check every write, so the first failure is
+// remembered here and reported by finish(), a full disk included.
+class OutputFile : public OIIO::Filesystem::IOProxy {
+ public:
+  // `extension` with its dot. Throws Error(OutputFailed).
+  OutputFile(const std::string& path, const std::string& extension);
+  ~OutputFile() override;
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  // Throws Error(OutputFailed) with one line: file, reason, mend.
+  void finish();
+  [[noreturn]] void fail(const std::string& reason) const;
+  const std::string& temporaryPath() const { return temporary_; }
+
+  const char* proxytype() const override { return "braid"; }
+  size_t write(const void* data, size_t size) override;
+  size_t pwrite(const void* data, size_t size, int64_t offset) override;
+  bool seek(int64_t offset) override;
+  int64_t tell() override;
+  size_t size() const override { return static_cast<size_t>(size_); }
+  void flush() const override {}
+
+ private:
+  void note(bool ok);
+
+  std::string target_, temporary_;
+  std::FILE* file_ = nullptr;
+  int64_t position_ = 0, size_ = 0;
+  int error_ = 0;  // errno of the first failure
+};
+
+}  // namespace braid

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/scene/camera.h"
+
+namespace braid {
+
+Camera::Camera(const CameraData& data, int width, int height)
+    : width_(static_cast<float>(width)), height_(static_cast<float>(height)), orthographic_(data.orthographic) {
+  const Mat3 rotation(data.toWorld);
+  position_ = Vec3(data.toWorld[3]);
+  right_ = glm::normalize(rotation[0]);
+  up_ = glm::normalize(rotation[1]);
+  forward_ = -glm::normalize(rotation[2]);
+  const float frameAspect = width_ / height_;
+  halfHeight_ = orthographic_ ? data.ymag : std::tan(0.5f * data.yfov);
+  halfWidth_ = halfHeight_ * frameAspect;
+}
+
+Camera::CameraRay Camera::ray(Vec2 raster) const {
+  const float x = (2 * raster.x / width_ - 1) * halfWidth_;
+  const float y = (1 - 2 * raster.y / height_) * halfHeight_;
+  if (orthographic_) return {position_ + x * right_ + y * up_, forward_};
+  return {position_, glm::normalize(forward_ + x * right_ + y * up_)};
+}
+
+std::optional<Vec2> Camera::project(const Vec3& point) const {
+  const Vec3 d = point - position_;
+  const float depth = glm::dot(d, forward_);
+  if (!(depth > 0)) return std::nullopt;
+  const float scale = orthographic_ ? 1.0f : 1.0f / depth;
+  const float x = glm::dot(d, right_) * scale / halfWidth_;
+  const float y = glm::dot(d, up_) * scale / halfHeight_;
+  return Vec2(0.5f * (x + 1) * width_, 0.5f * (1 - y) * height_);
+}
+
+Mat4 Camera::worldToCamera() const {
+  Mat4 m(1);
+  for (int i = 0; i < 3; ++i) m[i] = Vec4(right_[i], up_[i], -forward_[i], 0);
+  m[3] = Vec4(-glm::dot(right_, position_), -glm::dot(up_, position_), glm::dot(forward_, position_), 1);
+  return m;
+}
+
+Mat4 Camera::worldToNdc() const {
+  Mat4 projection(1);
+  projection[0][0] = 1 / halfWidth_;
+  projection[1][1] = 1 / halfHeight_;
+  if (!orthographic_) {
+    projection[2][2] = -1;
+    projection[2][3] = -1;
+    projection[3][3] = 0;
+  }
+  return projection * worldToCamera();
+}
+
+}  // namespace braid

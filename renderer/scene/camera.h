@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Perspective (pinhole) and orthographic cameras: rays, importance, and the projection of a point onto the raster.
+#pragma once
+
+#include <optional>
+
+#include "renderer/core/vec.h"
+#include "renderer/scene/scene_data.h"
+
+namespace braid {
+
+class Camera {
+ public:
+  Camera() = default;
+  // `width` × `height` is the full frame in pixels. A camera with its own aspect ratio keeps its vertical extent; the horizontal one follows
+  // the frame's aspect, as glTF leaves to the renderer.
+  Camera(const CameraData& data, int width, int height);
+
+  struct CameraRay {
+    Vec3 origin, direction;  // direction is unit
+  };
+  // Ray through the raster position (pixel centres at +0.5).
+  CameraRay ray(Vec2 raster) const;
+
+  // The raster position of a world point, or none behind the camera. Does not test against the frame.
+  std::optional<Vec2> project(const Vec3& point) const;
+
+  bool orthographic() const { return orthographic_; }
+  Vec3 position() const { return position_; }
+  Vec3 forward() const { return forward_; }
+  // Area of the frame on the plane at distance 1 (perspective) or on the sensor (orthographic), in m².
+  float frameArea() const { return 4 * halfWidth_ * halfHeight_; }
+  Mat4 worldToCamera() const;
+  Mat4 worldToNdc() const;
+
+ private:
+  Vec3 position_{0}, right_{1, 0, 0}, up_{0, 1, 0}, forward_{0, 0, -1};
+  float halfWidth_ = 1, halfHeight_ = 1;  // of the frame at distance 1, or of the sensor
+  float width_ = 1, height_ = 1;
+  bool orthographic_ = false;
+};
+
+}  // namespace braid

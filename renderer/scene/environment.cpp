@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/scene/environment.h"
+
+#include <algorithm>
+
+#include "renderer/core/parallel.h"
+
+namespace braid {
+
+namespace {
+
+// Interval of a normalised cumulative table that holds u, and the position of u within it.
+size_t findInterval(const float* cdf, size_t count, float u, float& fraction) {
+  const float* upper = std::upper_bound(cdf, cdf + count + 1, u);
+  const size_t i = static_cast<size_t>(std::clamp<ptrdiff_t>(upper - cdf - 1, 0, static_cast<ptrdiff_t>(count) - 1));
+  const float width = cdf[i + 1] - cdf[i];
+  fraction = width > 0 ? std::clamp((u - cdf[i]) / width, 0.0f, kOneMinusEpsilon) : 0.5f;
+  return i;
+}
+
+}  // namespace
+
+Environment::Environment(const EnvironmentData& data) : image_(data.image), scale_(data.radiance) {
+  cosRotation_ = std::cos(data.rotation);
+  sinRotation_ = std::sin(data.rotation);
+  if (!image_) {
+    average_ = scale_;
+    return;
+  }
+  width_ = image_->width;
+  height_ = image_->height;
+  buildDistribution();
+}
+
+// The angle φ grows to the right of the image; its centre (φ = π) is -Z and its upper edge +Y.
+Vec3 Environment::toLocal(const Vec3& d) const { return {cosRotation_ * d.x - sinRotation_ * d.z, d.y, sinRotation_ * d.x + cosRotation_ * d.z}; }
+Vec3 Environment::toWorld(const Vec3& d) const { return {cosRotation_ * d.x + sinRotation_ * d.z, d.y, -sinRotation_ * d.x + cosRotation_ * d.z}; }
+
+Spectrum Environment::texel(int x, int y) const {
+  const size_t channels = static_cast<size_t>(image_->channels);
+  const size_t i = (static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)) * channels;
+  if (!image_->floats.empty()) {
+    const float* p = &image_->floats[i];
+    return channels >= 3 ? Spectrum(p[0], p[1], p[2]) : Spectrum(p[0]);
+  }
+  const uint8_t* p = &image_->bytes[i];
+  const auto decode = [](uint8_t b) {
+    const float v = static_cast<float>(b) / 255.0f;
+    return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f);
+  };
+  return channels >= 3 ? Spectrum(decode(p[0]), decode(p[1]), decode(p[2])) : Spectrum(decode(p[0]));
+}
+
+// The density of a texel is the mean of the bilinear interpolant over it (weights 1/8, 3/4, 1/8 on each axis), so that it is positive
+// wherever the interpolated radiance is.
+void Environment::buildDistribution() {
+  const size_t w = static_cast<size_t>(width_), h = static_cast<size_t>(height_);
+  std::vector<float> luminances(w * h);
+  std::vector<glm::dvec3> rowSum(h);
+  parallelRows(height_, [&](int y) {
+    glm::dvec3 sum(0);
+    for (int x = 0; x < width_; ++x) {
+      const Spectrum s = texel(x, y);
+      sum += glm::dvec3(s);
+      luminances[static_cast<size_t>(y) * w + static_cast<size_t>(x)] = braid::average(s);
+    }
+    rowSum[static_cast<size_t>(y)] = sum / static_cast<double>(width_);
+  });
+  conditional_.resize((w + 1) * h);
+  marginal_.resize(h + 1);
+  std::vector<double> rowWeight(h);
+  const auto at = [&](int x, int y) {
+    return luminances[static_cast<size_t>(std::clamp(y, 0, height_ - 1)) * w + static_cast<size_t>((x + width_) % width_)];
+  };
+  parallelRows(height_, [&](int y) {
+    float* cdf = &conditional_[static_cast<size_t>(y) * (w + 1)];
+    const float sinTheta = std::sin(kPi * (static_cast<float>(y) + 0.5f) / static_cast<float>(height_));
+    std::vector<double> sum(w + 1, 0.0);
+    for (int x = 0; x < width_; ++x) {
+      double v = 0;
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx) v += (dx ? 0.125 : 0.75) * (dy ? 0.125 : 0.75) * static_cast<double>(at(x + dx, y + dy));
+      sum[static_cast<size_t>(x) + 1] = sum[static_cast<size_t>(x)] + v;
+    }
+    rowWeight[static_cast<size_t>(y)] = sum[w] / static_cast<double>(w) * static_cast<double>(sinTheta);
+    for (size_t x = 0; x <= w; ++x)
+      cdf[x] = static_cast<float>(sum[w] > 0 ? sum[x] / sum[w] : static_cast<double>(x) / static_cast<double>(w));
+  });
+  double total = 0, sinTotal = 0;
+  glm::dvec3 mean(0);
+  std::vector<double> cumulative(h + 1, 0.0);
+  for (size_t y = 0; y < h; ++y) {
+    const double sinTheta = std::sin(static_cast<double>(kPi) * (static_cast<double>(y) + 0.5) / static_cast<double>(h));
+    total += rowWeight[y];
+    cumulative[y + 1] = total;
+    mean += rowSum[y] * sinTheta;
+    sinTotal += sinTheta;
+  }
+  for (size_t y = 0; y <= h; ++y) marginal_[y] = static_cast<float>(total > 0 ? cumulative[y] / total : double(y) / double(h));
+  average_ = total > 0 ? scale_ * Spectrum(mean / sinTotal) : Spectrum(0);
+}
+
+Spectrum Environment::radiance(const Vec3& direction) const {
+  if (!image_) return scale_;
+  const Vec3 d = toLocal(direction);
+  const float phi = std::atan2(d.x, -d.z);  // 0 at -Z, growing toward +X
+  const float theta = std::acos(std::clamp(d.y, -1.0f, 1.0f));
+  const float x = (0.5f + phi * 0.5f * kInvPi) * static_cast<float>(width_) - 0.5f;
+  const float y = theta * kInvPi * static_cast<float>(height_) - 0.5f;
+  const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
+  const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
+  const auto at = [&](int i, int j) { return texel((i % width_ + width_) % width_, std::clamp(j, 0, height_ - 1)); };
+  const Spectrum top = at(x0, y0) * (1 - fx) + at(x0 + 1, y0) * fx;
+  const Spectrum bottom = at(x0, y0 + 1) * (1 - fx) + at(x0 + 1, y0 + 1) * fx;
+  return scale_ * (top * (1 - fy) + bottom * fy);
+}
+
+float Environment::sample(Vec2 u, Vec3& direction) const {
+  if (isBlack(average_)) return 0;
+  if (!image_) {
+    const float z = 1 - 2 * u.x, r = safeSqrt(1 - z * z), phi = 2 * kPi * u.y;
+    direction = {r * std::cos(phi), z, r * std::sin(phi)};
+    return 0.25f * kInvPi;
+  }
+  float fx, fy;
+  const size_t y = findInterval(marginal_.data(), static_cast<size_t>(height_), u.y, fy);
+  const size_t x = findInterval(&conditional_[y * (static_cast<size_t>(width_) + 1)], static_cast<size_t>(width_), u.x, fx);
+  const float theta = kPi * (static_cast<float>(y) + fy) / static_cast<float>(height_);
+  const float phi = 2 * kPi * ((static_cast<float>(x) + fx) / static_cast<float>(width_) - 0.5f);
+  const float sinTheta = std::sin(theta);
+  direction = toWorld({sinTheta * std::sin(phi), std::cos(theta), -sinTheta * std::cos(phi)});
+  return pdfW(direction);
+}
+
+float Environment::pdfW(const Vec3& direction) const {
+  if (isBlack(average_)) return 0;
+  if (!image_) return 0.25f * kInvPi;
+  const Vec3 d = toLocal(direction);
+  const float phi = std::atan2(d.x, -d.z);
+  const float theta = std::acos(std::clamp(d.y, -1.0f, 1.0f));
+  const float sinTheta = safeSqrt(1 - d.y * d.y);
+  if (!(sinTheta > 0)) return 0;
+  const int x = std::clamp(static_cast<int>((0.5f + phi * 0.5f * kInvPi) * static_cast<float>(width_)), 0, width_ - 1);
+  const int y = std::clamp(static_cast<int>(theta * kInvPi * static_cast<float>(height_)), 0, height_ - 1);
+  const float* cdf = &conditional_[static_cast<size_t>(y) * (static_cast<size_t>(width_) + 1)];
+  const float px = cdf[x + 1] - cdf[x], py = marginal_[static_cast<size_t>(y) + 1] - marginal_[static_cast<size_t>(y)];
+  return px * py * static_cast<float>(width_) * static_cast<float>(height_) / (2 * kPi * kPi * sinTheta);
+}
+
+}  // namespace braid

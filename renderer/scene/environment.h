@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// The environment: a latitude-longitude image or a constant, looked up by direction and importance-sampled by luminance · sin θ.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "renderer/core/vec.h"
+#include "renderer/scene/scene_data.h"
+
+namespace braid {
+
+class Environment {
+ public:
+  explicit Environment(const EnvironmentData& data);
+
+  // Radiance arriving from the world direction (unit, pointing away from the scene).
+  Spectrum radiance(const Vec3& direction) const;
+  // Picks a direction; returns its density per solid angle, 0 if the environment is black.
+  float sample(Vec2 u, Vec3& direction) const;
+  float pdfW(const Vec3& direction) const;
+
+  bool constant() const { return image_ == nullptr; }
+  // Mean radiance over the sphere.
+  Spectrum average() const { return average_; }
+  size_t bytes() const { return (conditional_.size() + marginal_.size()) * sizeof(float); }
+
+ private:
+  Vec3 toLocal(const Vec3& direction) const;
+  Vec3 toWorld(const Vec3& direction) const;
+  Spectrum texel(int x, int y) const;
+  void buildDistribution();
+
+  std::shared_ptr<const Image> image_;
+  Spectrum scale_{0};
+  Spectrum average_{0};
+  float cosRotation_ = 1, sinRotation_ = 0;
+  int width_ = 0, height_ = 0;
+  std::vector<float> conditional_;  // per row: width + 1 cumulative values, normalised
+  std::vector<float> marginal_;     // height + 1 cumulative values, normalised
+};
+
+}  // namespace braid

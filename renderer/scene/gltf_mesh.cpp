@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/scene/gltf_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "renderer/scene/gltf_accessor.h"
+#include "renderer/scene/mesh_repair.h"
+#include "renderer/scene/tangents.h"
+
+namespace braid::gltf {
+
+namespace {
+
+class MeshBuilder {
+ public:
+  MeshBuilder(const Document& document, const MeshJob& job, Report& report)
+      : document_(document), job_(job), primitive_(*job.primitive), report_(report) {}
+
+  TriangleMesh build() {
+    if (!open()) return {};
+    readTriangles();
+    selectVertices();
+    mesh_.positions = morphed<Vec3>("POSITION");
+    mesh_.normals = morphed<Vec3>("NORMAL");
+    // Supplied tangents belong to supplied normals; without those they are to be ignored.
+    if (!mesh_.normals.empty() && wantsTangents()) readTangents();
+    readUvs();
+    readColors();
+    if (job_.joints) skin();
+    if (!dropBadTriangles(mesh_, report_, primitive_.pointer)) return {};
+    extras_.uv = std::move(tangentUv_);
+    compactVertices(mesh_, extras_);
+    repairNormals(mesh_, report_, primitive_.pointer);
+    finishTangents();
+    mesh_.name = job_.name;
+    mesh_.material = job_.material;
+    mesh_.padForEmbree();
+    return std::move(mesh_);
+  }
+
+ private:
+  bool wantsTangents() const { return job_.needsTangents || job_.keepAllAttributes; }
+
+  bool open() {
+    if (primitive_.mode < 4) {
+      report_.warn(primitive_.pointer, "points and lines are not drawn");
+      return false;
+    }
+    const auto position = primitive_.attributes.find("POSITION");
+    if (position == primitive_.attributes.end()) return false;
+    vertices_ = document_.accessors[position->second].count;
+    if (primitive_.draco) {
+      draco_ = decodeDraco(document_, primitive_, report_);
+      if (!draco_) return false;
+      vertices_ = draco_->vertices;
+    }
+    fileVertices_ = vertices_;
+    if (vertices_ == 0) report_.warn(primitive_.pointer, "a primitive has no vertices");
+    if (vertices_ > std::numeric_limits<uint32_t>::max()) {
+      report_.problem(primitive_.pointer, "has more than 2^32 vertices; split it");
+      return false;
+    }
+    return vertices_ > 0;
+  }
+
+  bool has(const std::string& name) const { return primitive_.attributes.contains(name); }
+
+  // The values of an attribute and their number per vertex; nothing if it is absent.
+  std::vector<float> values(const std::string& name, uint32_t& components) {
+    components = 0;
+    if (draco_) {
+      const auto found = draco_->attributes.find(name);
+      if (found != draco_->attributes.end()) {
+        components = found->second.components;
+        return std::move(found->second.values);
+      }
+    }
+    const auto found = primitive_.attributes.find(name);
+    if (found == primitive_.attributes.end()) return {};
+    const Accessor& accessor = document_.accessors[found->second];
+    if (accessor.count != fileVertices_) {
+      report_.warn(primitive_.pointer,
+                   "attribute " + quoted(name) + " does not fit the compressed mesh; it is ignored");
+      return {};
+    }
+    components = accessor.components();
+    const bool isFraction = name.starts_with("COLOR_") || name.starts_with("WEIGHTS_");
+    return read(found->second, isFraction ? Integers::AlwaysNormalized : Integers::AsDeclared);
+  }
+
+  std::vector<float> read(uint32_t accessor, Integers integers = Integers::AsDeclared) const {
+    return selected_.empty() ? readFloats(document_, accessor, integers)
+                             : gatherFloats(document_, accessor, selected_, integers);
+  }
+
+  // Adds the weighted displacements of the morph targets. Those of tangents have three components, of colours three or
+  // four.
+  void addTargets(const std::string& name, std::vector<float>& base, uint32_t components) const {
+    for (size_t t = 0; t < std::min(primitive_.targets.size(), job_.weights.size()); ++t) {
+      const float weight = job_.weights[t];
+      const auto found = primitive_.targets[t].find(name);
+      if (weight == 0 || found == primitive_.targets[t].end()) continue;
+      const Accessor& accessor = document_.accessors[found->second];
+      const uint32_t width = accessor.components();
+      if (accessor.count != fileVertices_ || width > components) continue;
+      const std::vector<float> delta = read(found->second);
+      for (size_t v = 0; v < vertices_; ++v) {
+        for (size_t c = 0; c < width; ++c) base[v * components + c] += weight * delta[v * width + c];
+      }
+    }
+  }
+
+  template <class Vector>
+  std::vector<Vector> morphed(const std::string& name) {
+    uint32_t components = 0;
+    std::vector<float> base = values(name, components);
+    if (components != uint32_t(Vector::length())) return {};
+    addTargets(name, base, components);
+    return asVectors<Vector>(base);
+  }
+
+  void readTriangles() {
+    std::vector<uint32_t> indices;
+    if (draco_) {
+      indices = std::move(draco_->indices);
+    } else if (primitive_.indices != kNone) {
+      indices = readIntegers(document_, primitive_.indices);
+    } else {
+      indices.resize(vertices_);
+      for (size_t i = 0; i < indices.size(); ++i) indices[i] = static_cast<uint32_t>(i);
+    }
+    // A compressed strip comes out of its decoder as a list.
+    if (primitive_.mode == 4 || draco_) {
+      if (indices.size() % 3 != 0)
+        report_.warn(primitive_.pointer, "the number of indices is not a multiple of 3; the rest is ignored");
+      mesh_.triangles.resize(indices.size() / 3);
+      for (size_t i = 0; i < mesh_.triangles.size(); ++i)
+        mesh_.triangles[i] = {indices[3 * i], indices[3 * i + 1], indices[3 * i + 2]};
+      return;
+    }
+    const bool isStrip = primitive_.mode == 5;
+    for (size_t i = 0; i + 2 < indices.size(); ++i) {
+      const size_t odd = isStrip ? i % 2 : 0;
+      if (isStrip) {
+        mesh_.triangles.push_back({indices[i], indices[i + 1 + odd], indices[i + 2 - odd]});
+      } else {
+        mesh_.triangles.push_back({indices[i + 1], indices[i + 2], indices[0]});
+      }
+    }
+  }
+
+  // Many primitives may each use a small part of one large set of vertices: only that part is read.
+  void selectVertices() {
+    if (draco_ || mesh_.triangles.empty() || mesh_.triangles.size() * 12 > vertices_) return;
+    for (const glm::uvec3& t : mesh_.triangles) selected_.insert(selected_.end(), {t.x, t.y, t.z});
+    std::sort(selected_.begin(), selected_.end());
+    selected_.erase(std::unique(selected_.begin(), selected_.end()), selected_.end());
+    const auto place = [&](uint32_t v) {
+      return static_cast<uint32_t>(std::lower_bound(selected_.begin(), selected_.end(), v) - selected_.begin());
+    };
+    for (glm::uvec3& t : mesh_.triangles) t = {place(t.x), place(t.y), place(t.z)};
+    vertices_ = selected_.size();
+  }
+
+  void readTangents() { mesh_.tangents = morphed<Vec4>("TANGENT"); }
+
+  std::vector<Vec2> readUv(uint32_t set) {
+    return set == kNone ? std::vector<Vec2>() : morphed<Vec2>("TEXCOORD_" + std::to_string(set));
+  }
+
+  void readUvs() {
+    for (uint32_t slot = 0; slot < 2; ++slot) {
+      uint32_t set = job_.uvs.set[slot];
+      if (set != kNone && !has("TEXCOORD_" + std::to_string(set))) {
+        report_.warn(primitive_.pointer,
+                     "a texture reads TEXCOORD_" + std::to_string(set) + ", which the primitive does not have");
+      }
+      if (set == kNone && job_.keepAllAttributes) set = slot;
+      mesh_.uv[slot] = readUv(set);
+      for (Vec2& uv : mesh_.uv[slot]) {
+        if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = Vec2(0);
+      }
+      if (set == job_.uvs.tangentSet) tangentSlot_ = slot;
+    }
+    const bool isExtra = wantsTangents() && mesh_.tangents.empty() && tangentSlot_ == kNone;
+    if (isExtra) tangentUv_ = readUv(job_.uvs.tangentSet);
+  }
+
+  void readColors() {
+    uint32_t components = 0;
+    std::vector<float> base = values("COLOR_0", components);
+    if (components < 3) return;
+    addTargets("COLOR_0", base, components);
+    mesh_.colors.resize(vertices_);
+    for (size_t v = 0; v < vertices_; ++v) {
+      const float* c = &base[v * components];
+      const Vec4 color(c[0], c[1], c[2], components == 4 ? c[3] : 1.0f);
+      // Written so that NaN becomes 0.
+      for (int k = 0; k < 4; ++k) mesh_.colors[v][k] = color[k] > 0 ? std::min(color[k], 1.0f) : 0.0f;
+    }
+  }
+
+  void skin() {
+    std::vector<glm::mat4> blended(vertices_, glm::mat4(0));
+    std::vector<float> total(vertices_, 0.0f);
+    for (int set = 0; has("JOINTS_" + std::to_string(set)); ++set) addInfluences(std::to_string(set), blended, total);
+    uint64_t unweighted = 0;
+    for (size_t v = 0; v < vertices_; ++v) {
+      if (!(total[v] > 1e-6f)) {
+        ++unweighted;
+        blended[v] = job_.joints->front();
+        total[v] = 1;
+      }
+      transformVertex(v, blended[v] * (1 / total[v]));
+    }
+    if (unweighted > 0)
+      report_.warn(primitive_.pointer, "a skinned vertex has no weights; it follows the first joint", unweighted);
+  }
+
+  void addInfluences(const std::string& set, std::vector<glm::mat4>& blended, std::vector<float>& total) {
+    uint32_t jointWidth = 0, weightWidth = 0;
+    const std::vector<float> joints = values("JOINTS_" + set, jointWidth),
+                             weights = values("WEIGHTS_" + set, weightWidth);
+    if (jointWidth != 4 || weightWidth != 4) {
+      report_.warn(primitive_.pointer, "JOINTS and WEIGHTS do not match; they are ignored");
+      return;
+    }
+    for (size_t i = 0; i < vertices_ * 4; ++i) {
+      if (!(weights[i] > 0) || !std::isfinite(weights[i])) continue;
+      // Accessors were validated; a compressed mesh may still name a joint that does not exist.
+      const auto joint = static_cast<size_t>(std::max(joints[i], 0.0f));
+      if (joint >= job_.joints->size()) continue;
+      blended[i / 4] += (*job_.joints)[joint] * weights[i];
+      total[i / 4] += weights[i];
+    }
+  }
+
+  void transformVertex(size_t v, const glm::mat4& m) {
+    mesh_.positions[v] = Vec3(m * Vec4(mesh_.positions[v], 1));
+    const glm::mat3 linear(m);
+    if (!mesh_.normals.empty()) {
+      // Cofactors: the inverse transpose times the determinant, defined for singular matrices too.
+      const glm::mat3 cofactors(glm::cross(linear[1], linear[2]), glm::cross(linear[2], linear[0]),
+                                glm::cross(linear[0], linear[1]));
+      const float side = glm::dot(linear[0], cofactors[0]) < 0 ? -1.0f : 1.0f;
+      mesh_.normals[v] = normalizedOr(side * (cofactors * mesh_.normals[v]), Vec3(0));
+    }
+    if (!mesh_.tangents.empty()) mesh_.tangents[v] = Vec4(linear * Vec3(mesh_.tangents[v]), mesh_.tangents[v].w);
+  }
+
+  void finishTangents() {
+    if (!wantsTangents()) return;
+    if (!mesh_.tangents.empty() && repairTangents(mesh_, report_, primitive_.pointer)) return;
+    mesh_.tangents.clear();
+    if (!job_.needsTangents) return;
+    const std::vector<Vec2>& uv = tangentSlot_ == kNone ? extras_.uv : mesh_.uv[tangentSlot_];
+    if (uv.empty()) {
+      report_.warn(primitive_.pointer,
+                   "a material needs tangents, but the primitive has neither tangents nor texture coordinates");
+      return;
+    }
+    // Flat shading has a tangent frame for each triangle, so its vertices cannot be shared.
+    if (mesh_.normals.empty()) splitIntoFlatTriangles(mesh_, extras_);
+    generateTangents(mesh_, uv);
+  }
+
+  const Document& document_;
+  const MeshJob& job_;
+  const Primitive& primitive_;
+  Report& report_;
+  std::optional<DracoMesh> draco_;
+  uint64_t fileVertices_ = 0;       // of the accessors
+  uint64_t vertices_ = 0;           // read
+  std::vector<uint32_t> selected_;  // which ones, ascending; empty: all
+  TriangleMesh mesh_;
+  uint32_t tangentSlot_ = kNone;  // the uv slot tangents follow, if it is kept
+  std::vector<Vec2> tangentUv_;   // else its texture coordinates
+  ExtraAttributes extras_;
+};
+
+}  // namespace
+
+TriangleMesh buildMesh(const Document& document, const MeshJob& job, Report& report) {
+  try {
+    return MeshBuilder(document, job, report).build();
+  } catch (const std::bad_alloc&) {
+    // A compressed mesh may claim any size.
+    if (!job.primitive->draco) throw;
+    report.problem(job.primitive->pointer, "needs more memory than there is; compress the file again");
+    return {};
+  }
+}
+
+uint64_t estimatedBytes(const Document& document, const Primitive& primitive) {
+  const auto position = primitive.attributes.find("POSITION");
+  if (position == primitive.attributes.end() || primitive.mode < 4) return 0;
+  const uint64_t vertices = document.accessors[position->second].count;
+  const uint64_t indices = primitive.indices == kNone ? vertices : document.accessors[primitive.indices].count;
+  const uint64_t triangles = primitive.mode == 4 ? indices / 3 : indices;
+  // Vertices that no triangle uses are dropped. Decompressing the same data again and again would take for ever too.
+  constexpr uint64_t kDracoRatio = 8;
+  const uint64_t compressed = primitive.draco ? document.views[primitive.draco->view].data.size() * kDracoRatio : 0;
+  return compressed + triangles * sizeof(glm::uvec3) + std::min(vertices, triangles * 3) * 2 * sizeof(Vec3);
+}
+
+}  // namespace braid::gltf

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/scene/scene.h"
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+
+#include "renderer/core/error.h"
+#include "renderer/core/hash.h"
+#include "renderer/core/parallel.h"
+#include "renderer/scene/closed_mesh.h"
+
+namespace braid {
+
+namespace {
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// Bakes a transform into a mesh. Normals go by the inverse transpose; a mirrored mesh has its winding turned so that the cross product of
+// the edges keeps pointing to the front.
+void transformMesh(TriangleMesh& mesh, const Mat4& toWorld) {
+  if (toWorld == Mat4(1)) return;
+  const Mat3 linear(toWorld);
+  const Mat3 normalMatrix = glm::transpose(glm::inverse(linear));
+  const bool mirrored = glm::determinant(linear) < 0;
+  parallelChunks(mesh.positions.size(), 4096, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) mesh.positions[i] = Vec3(toWorld * Vec4(mesh.positions[i], 1));
+  });
+  for (Vec3& n : mesh.normals) {
+    const Vec3 transformed = normalMatrix * n;
+    const float length = glm::length(transformed);
+    if (length > 0) n = transformed / length;
+  }
+  for (Vec4& t : mesh.tangents) {
+    const Vec3 transformed = linear * Vec3(t);
+    const float length = glm::length(transformed);
+    if (length > 0) t = Vec4(transformed / length, mirrored ? -t.w : t.w);
+  }
+  if (mirrored)
+    for (glm::uvec3& t : mesh.triangles) std::swap(t.y, t.z);
+}
+
+}  // namespace
+
+Scene::Scene(SceneData data, const SceneOptions& options) : data_(std::move(data)) {
+  const auto start = std::chrono::steady_clock::now();
+  for (const TriangleMesh& mesh : data_.meshes) BRAID_ASSERT(mesh.material < data_.materials.size());
+  if (data_.environment) environment_.emplace(*data_.environment);
+  placeMeshes();
+  markFilteredMeshes(options.full);
+  collectEmitters();
+  detectTraits();
+  times_.prepare = secondsSince(start);
+
+  const auto buildStart = std::chrono::steady_clock::now();
+  AccelInput input;
+  input.meshes = &data_.meshes;
+  input.filtered = &filtered_;
+  input.worldMeshes = &worldMeshes_;
+  input.groups = &groups_;
+  input.instances = &instances_;
+  input.isa = options.isa;
+  input.highQuality = options.highQuality.value_or(traits_.triangles <= 4'000'000);
+  const bool anyFilter = std::any_of(filtered_.begin(), filtered_.end(), [](uint8_t f) { return f != 0; });
+  accel_.build(input, anyFilter ? this : nullptr);
+  times_.hierarchy = secondsSince(buildStart);
+}
+
+// Meshes placed once are baked into world space, which spares every ray the instance transform; meshes placed several times keep one copy.
+// Meshes with the same list of placements form a group, so that a tree's trunk and leaves are one instance.
+void Scene::placeMeshes() {
+  std::vector<std::vector<size_t>> placements(data_.meshes.size());
+  for (size_t i = 0; i < data_.instances.size(); ++i) placements[data_.instances[i].mesh].push_back(i);
+
+  std::map<uint64_t, std::vector<uint32_t>> byPlacement;
+  std::vector<uint64_t> order;
+  for (uint32_t m = 0; m < data_.meshes.size(); ++m) {
+    TriangleMesh& mesh = data_.meshes[m];
+    if (placements[m].empty() || mesh.triangles.empty()) continue;
+    if (placements[m].size() == 1) {
+      transformMesh(mesh, data_.instances[placements[m][0]].toWorld);
+      mesh.padForEmbree();
+      worldMeshes_.push_back(m);
+      continue;
+    }
+    mesh.padForEmbree();
+    ContentHash hash;
+    for (size_t i : placements[m]) hash.add(&data_.instances[i].toWorld, sizeof(Mat4));
+    auto [entry, isNew] = byPlacement.try_emplace(hash.value());
+    if (isNew) order.push_back(hash.value());
+    entry->second.push_back(m);
+  }
+  for (uint64_t key : order) {
+    const std::vector<uint32_t>& meshes = byPlacement[key];
+    const auto group = static_cast<uint32_t>(groups_.size());
+    groups_.push_back({meshes});
+    for (size_t i : placements[meshes[0]]) {
+      GroupInstance instance;
+      instance.group = group;
+      instance.toWorld = data_.instances[i].toWorld;
+      instance.toObject = glm::inverse(instance.toWorld);
+      instances_.push_back(instance);
+    }
+  }
+  for (uint32_t m : worldMeshes_)
+    for (const Vec3& p : data_.meshes[m].positions) bounds_.extend(p);
+  std::vector<Bounds> groupBounds(groups_.size());
+  for (size_t g = 0; g < groups_.size(); ++g)
+    for (uint32_t m : groups_[g].meshes)
+      for (const Vec3& p : data_.meshes[m].positions) groupBounds[g].extend(p);
+  for (const GroupInstance& instance : instances_) {
+    const Bounds& b = groupBounds[instance.group];
+    for (int corner = 0; corner < 8; ++corner)
+      bounds_.extend(Vec3(instance.toWorld * Vec4(corner & 1 ? b.hi.x : b.lo.x, corner & 2 ? b.hi.y : b.lo.y, corner & 4 ? b.hi.z : b.lo.z, 1)));
+  }
+}
+
+// A mesh needs the any-hit filter when rays may pass through its triangles: alpha, or culled back faces of an open single-sided surface.
+// A closed outward-facing surface is never seen from behind, so its back faces need no culling.
+void Scene::markFilteredMeshes(bool full) {
+  filtered_.assign(data_.meshes.size(), 0);
+  tbb::parallel_for(size_t(0), data_.meshes.size(), [&](size_t m) {
+    const TriangleMesh& mesh = data_.meshes[m];
+    const Material& material = data_.materials[mesh.material];
+    const bool culled = !material.doubleSided && !material.transmissive() && material.diffuseTransmission == 0;
+    filtered_[m] = full || material.alphaMode != AlphaMode::Opaque || (culled && !isClosedOutward(mesh));
+  });
+}
+
+void Scene::appendEmitters(uint32_t meshIndex, const Mat4& toWorld) {
+  const TriangleMesh& mesh = data_.meshes[meshIndex];
+  const Material& material = data_.materials[mesh.material];
+  const bool mirrored = glm::determinant(Mat3(toWorld)) < 0;
+  const size_t first = emitters_.size();
+  emitters_.resize(first + mesh.triangles.size());
+  parallelChunks(mesh.triangles.size(), 1024, [&](size_t begin, size_t end) {
+    for (size_t t = begin; t < end; ++t) {
+      const glm::uvec3& index = mesh.triangles[t];
+      EmissiveTriangle& e = emitters_[first + t];
+      e.p0 = Vec3(toWorld * Vec4(mesh.positions[index.x], 1));
+      e.e1 = Vec3(toWorld * Vec4(mesh.positions[index.y], 1)) - e.p0;
+      e.e2 = Vec3(toWorld * Vec4(mesh.positions[index.z], 1)) - e.p0;
+      // In double: a triangle of 10⁻⁸ m sides would underflow in float.
+      glm::dvec3 cross = glm::cross(glm::dvec3(e.e1), glm::dvec3(e.e2));
+      if (mirrored) cross = -cross;
+      const double length = glm::length(cross);
+      e.normal = length > 0 ? Vec3(cross / length) : Vec3(0);
+      e.area = static_cast<float>(0.5 * length);
+      e.mesh = meshIndex;
+      e.triangle = static_cast<uint32_t>(t);
+      e.twoSided = material.doubleSided;
+      e.textured = bool(material.emissiveTexture);
+      e.meanRadiance = material.emission;
+      if (e.textured) {
+        // Centroid-like lattice of 28 points; only guides sampling, so a coarse mean is enough.
+        Spectrum sum(0);
+        for (int i = 0; i < 7; ++i)
+          for (int j = 0; j < 7 - i; ++j)
+            sum += emission(mesh, e.triangle, (static_cast<float>(i) + 0.33f) / 7, (static_cast<float>(j) + 0.33f) / 7);
+        e.meanRadiance = sum / 28.0f;
+      }
+      if (e.area == 0) e.meanRadiance = Spectrum(0);
+    }
+  });
+}
+
+void Scene::collectEmitters() {
+  const auto emits = [&](uint32_t m) {
+    const Material& material = data_.materials[data_.meshes[m].material];
+    return material.emissive() && !material.unlit;
+  };
+  meshEmitterBase_.assign(data_.meshes.size(), -1);
+  for (uint32_t m : worldMeshes_) {
+    if (!emits(m)) continue;
+    meshEmitterBase_[m] = static_cast<int64_t>(emitters_.size());
+    appendEmitters(m, Mat4(1));
+  }
+  instanceEmitterBase_.resize(instances_.size());
+  for (size_t i = 0; i < instances_.size(); ++i) {
+    const MeshGroup& group = groups_[instances_[i].group];
+    if (std::none_of(group.meshes.begin(), group.meshes.end(), emits)) continue;
+    instanceEmitterBase_[i].assign(group.meshes.size(), -1);
+    for (size_t k = 0; k < group.meshes.size(); ++k) {
+      if (!emits(group.meshes[k])) continue;
+      instanceEmitterBase_[i][k] = static_cast<int64_t>(emitters_.size());
+      appendEmitters(group.meshes[k], instances_[i].toWorld);
+    }
+  }
+}
+
+int64_t Scene::emitterIndex(uint32_t mesh, uint32_t triangle, uint32_t instance) const {
+  int64_t base = -1;
+  if (instance == kNoInstance) {
+    base = meshEmitterBase_[mesh];
+  } else if (!instanceEmitterBase_[instance].empty()) {
+    const std::vector<uint32_t>& meshes = groups_[instances_[instance].group].meshes;
+    const auto k = static_cast<size_t>(std::find(meshes.begin(), meshes.end(), mesh) - meshes.begin());
+    base = instanceEmitterBase_[instance][k];
+  }
+  return base < 0 ? -1 : base + triangle;
+}
+
+Vec4 Scene::lookup(const TextureRef& ref, const TriangleMesh& mesh, uint32_t triangle, float u, float v) const {
+  const std::vector<Vec2>& uv = mesh.uv[ref.uvSet];
+  // A mesh without the coordinates a material asks for reads texel (0, 0).
+  const Vec2 at = uv.empty() ? Vec2(0) : interpolate(uv, mesh.triangles[triangle], u, v);
+  return data_.textures[static_cast<size_t>(ref.texture)].sample(ref.apply(at));
+}
+
+Spectrum Scene::emission(const TriangleMesh& mesh, uint32_t triangle, float u, float v) const {
+  const Material& m = material(mesh);
+  return m.emissiveTexture ? m.emission * Spectrum(lookup(m.emissiveTexture, mesh, triangle, u, v)) : m.emission;
+}
+
+float Scene::alpha(const TriangleMesh& mesh, uint32_t triangle, float u, float v) const {
+  const Material& m = material(mesh);
+  if (m.alphaMode == AlphaMode::Opaque) return 1;
+  float a = m.alpha;
+  if (m.baseColorTexture) a *= lookup(m.baseColorTexture, mesh, triangle, u, v).a;
+  if (!mesh.colors.empty()) a *= interpolate(mesh.colors, mesh.triangles[triangle], u, v).a;
+  if (m.alphaMode == AlphaMode::Mask) return a >= m.alphaCutoff ? 1.0f : 0.0f;
+  return std::clamp(a, 0.0f, 1.0f);
+}
+
+bool Scene::passThrough(uint32_t meshIndex, uint32_t triangle, float u, float v, bool backFace, uint32_t salt) const {
+  const TriangleMesh& m = data_.meshes[meshIndex];
+  const Material& mat = material(m);
+  if (backFace && !mat.doubleSided && !mat.transmissive() && mat.diffuseTransmission == 0) return true;
+  if (mat.alphaMode == AlphaMode::Opaque) return false;
+  const float a = alpha(m, triangle, u, v);
+  if (a <= 0) return true;
+  if (a >= 1) return false;
+  // Coverage decided once per ray and triangle: the same answer if Embree asks twice.
+  const uint32_t h = mix32(mix32(salt ^ (meshIndex * 0x9e3779b9u)) ^ triangle);
+  return static_cast<float>(h >> 8) * 0x1p-24f >= a;
+}
+
+size_t Scene::geometryBytes() const {
+  size_t bytes = instances_.size() * sizeof(GroupInstance) + emitters_.size() * sizeof(EmissiveTriangle);
+  for (const TriangleMesh& m : data_.meshes)
+    bytes += m.positions.capacity() * sizeof(Vec3) + m.triangles.capacity() * sizeof(glm::uvec3) + m.normals.capacity() * sizeof(Vec3) +
+             m.tangents.capacity() * sizeof(Vec4) + (m.uv[0].capacity() + m.uv[1].capacity()) * sizeof(Vec2) + m.colors.capacity() * sizeof(Vec4);
+  return bytes;
+}
+
+size_t Scene::textureBytes() const {
+  size_t bytes = environment_ ? environment_->bytes() : 0;
+  std::map<const Image*, size_t> images;
+  for (const Texture& t : data_.textures)
+    if (t.sharedImage()) images[t.sharedImage().get()] = t.bytes();
+  for (const auto& [image, size] : images) bytes += size;
+  return bytes;
+}
+
+}  // namespace braid

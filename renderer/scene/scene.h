@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// The immutable scene that integrators see: geometry with its ray acceleration structure, materials, lights, and what it contains (traits).
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "renderer/scene/accel.h"
+#include "renderer/scene/emitters.h"
+#include "renderer/scene/environment.h"
+#include "renderer/scene/scene_data.h"
+#include "renderer/scene/traits.h"
+
+namespace braid {
+
+struct SceneOptions {
+  std::string isa;          // Embree instruction set, e.g. "avx2"; empty: Embree's choice
+  bool full = false;        // no pruning: filters on every mesh
+  std::optional<bool> highQuality;  // spatial splits in the hierarchies; none: up to 4 million triangles
+};
+
+// Seconds spent building, for reports.
+struct BuildTimes {
+  double prepare = 0, hierarchy = 0;
+};
+
+class Scene : private HitFilter {
+ public:
+  explicit Scene(SceneData data, const SceneOptions& options = {});
+  Scene(const Scene&) = delete;
+  Scene& operator=(const Scene&) = delete;
+
+  const SceneData& data() const { return data_; }
+  const std::vector<TriangleMesh>& meshes() const { return data_.meshes; }
+  const std::vector<Material>& materials() const { return data_.materials; }
+  const std::vector<Texture>& textures() const { return data_.textures; }
+  const std::vector<PunctualLight>& lights() const { return data_.lights; }
+  const std::optional<Environment>& environment() const { return environment_; }
+  const std::vector<EmissiveTriangle>& emitters() const { return emitters_; }
+  const std::vector<GroupInstance>& instances() const { return instances_; }
+  const Accel& accel() const { return accel_; }
+  const SceneTraits& traits() const { return traits_; }
+  const Bounds& bounds() const { return bounds_; }
+  const BuildTimes& buildTimes() const { return times_; }
+
+  const TriangleMesh& mesh(uint32_t i) const { return data_.meshes[i]; }
+  const Material& material(const TriangleMesh& mesh) const { return data_.materials[mesh.material]; }
+
+  // Index into emitters() of a hit triangle, or -1.
+  int64_t emitterIndex(uint32_t mesh, uint32_t triangle, uint32_t instance) const;
+  // Radiance leaving an emissive surface at a uv-interpolated point of a triangle with barycentric weights (1-u-v, u, v).
+  Spectrum emission(const TriangleMesh& mesh, uint32_t triangle, float u, float v) const;
+  // Coverage of a surface point in [0,1] (alpha mode OPAQUE: 1).
+  float alpha(const TriangleMesh& mesh, uint32_t triangle, float u, float v) const;
+
+  // Bytes of vertices, indices and textures (without Embree's own).
+  size_t geometryBytes() const;
+  size_t textureBytes() const;
+
+  Vec4 lookup(const TextureRef& ref, const TriangleMesh& mesh, uint32_t triangle, float u, float v) const;
+
+ private:
+  bool passThrough(uint32_t mesh, uint32_t triangle, float u, float v, bool backFace, uint32_t salt) const override;
+  void placeMeshes();
+  void markFilteredMeshes(bool full);
+  void collectEmitters();
+  void appendEmitters(uint32_t mesh, const Mat4& toWorld);
+  void detectTraits();
+
+  SceneData data_;
+  std::optional<Environment> environment_;
+  std::vector<uint32_t> worldMeshes_;
+  std::vector<MeshGroup> groups_;
+  std::vector<GroupInstance> instances_;
+  std::vector<uint8_t> filtered_;  // per mesh
+  std::vector<EmissiveTriangle> emitters_;
+  std::vector<int64_t> meshEmitterBase_;                   // per world mesh index: first emitter or -1
+  std::vector<std::vector<int64_t>> instanceEmitterBase_;  // per instance, per mesh of its group (empty when none emits)
+  Bounds bounds_;
+  SceneTraits traits_;
+  BuildTimes times_;
+  Accel accel_;
+};
+
+// Interpolates a per-vertex attribute at barycentric weights (1-u-v, u, v).
+template <class T>
+T interpolate(const std::vector<T>& attribute, const glm::uvec3& triangle, float u, float v) {
+  return attribute[triangle.x] * (1 - u - v) + attribute[triangle.y] * u + attribute[triangle.z] * v;
+}
+
+}  // namespace braid

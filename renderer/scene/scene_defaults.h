@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a scene gets when its file brings none: a camera that frames everything and a grey dome.
+#pragma once
+
+#include "renderer/scene/scene_data.h"
+
+namespace braid {
+
+Bounds worldBounds(const SceneData& scene);
+
+// A perspective camera outside the bounds that sees all of them.
+CameraData framingCamera(const SceneData& scene);
+
+// Whether anything in the scene gives light.
+bool hasLight(const SceneData& scene);
+
+}  // namespace braid

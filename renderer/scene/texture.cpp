@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/scene/texture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+
+#include "renderer/core/error.h"
+
+namespace braid {
+
+namespace {
+
+constexpr uint64_t kMaxPixels = uint64_t(1) << 28;
+
+float srgbToLinear(float v) { return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f); }
+
+struct ByteTables {
+  std::array<float, 256> linear, srgb;
+  ByteTables() {
+    for (size_t i = 0; i < 256; ++i) {
+      linear[i] = static_cast<float>(i) / 255.0f;
+      srgb[i] = srgbToLinear(linear[i]);
+    }
+  }
+};
+
+const ByteTables& byteTables() {
+  static const ByteTables tables;
+  return tables;
+}
+
+// 16-bit colours: decoded once into a copy, as no table fits them.
+std::shared_ptr<const Image> decodedFromSrgb(const Image& image) {
+  auto copy = std::make_shared<Image>(image);
+  const auto channels = static_cast<size_t>(image.channels);
+  for (size_t i = 0; i < copy->floats.size(); ++i) {
+    const bool isAlpha = image.hasAlpha() && i % channels == channels - 1;
+    if (!isAlpha) copy->floats[i] = srgbToLinear(copy->floats[i]);
+  }
+  copy->integerFloats = false;
+  return copy;
+}
+
+// Texel positions of one axis: the two neighbours and the weight of the second.
+struct Taps {
+  int first, second;
+  float weight;
+};
+
+// For |x| below 2^31: two instructions, where std::floor is a call unless the build targets SSE 4.1.
+inline int floorToInt(float x) {
+  const int i = static_cast<int>(x);
+  return i - (x < static_cast<float>(i) ? 1 : 0);
+}
+
+// Brings a coordinate into [0,1]; anything without a meaningful fraction (NaN, infinity, huge) becomes 0.
+inline float wrapped(float u, Wrap wrap) {
+  if (!(std::abs(u) < 1e7f)) return 0;
+  if (wrap == Wrap::Repeat) return u - static_cast<float>(floorToInt(u));
+  if (wrap == Wrap::Clamp) return std::clamp(u, 0.0f, 1.0f);
+  const float t = std::abs(u - 2 * static_cast<float>(floorToInt(0.5f * u + 0.5f)));
+  return std::min(t, 1.0f);
+}
+
+inline Taps linearTaps(float u, Wrap wrap, int size) {
+  const float x = wrapped(u, wrap) * static_cast<float>(size) - 0.5f;
+  const int low = floorToInt(x);
+  Taps taps{low, low + 1, x - static_cast<float>(low)};
+  // Only the outermost half texel has a neighbour beyond the border. A mirrored image repeats its border texel there.
+  if (taps.first < 0) taps.first = wrap == Wrap::Repeat ? size - 1 : 0;
+  if (taps.second >= size) taps.second = wrap == Wrap::Repeat ? 0 : size - 1;
+  return taps;
+}
+
+inline int nearestTap(float u, Wrap wrap, int size) {
+  return std::min(static_cast<int>(wrapped(u, wrap) * static_cast<float>(size)), size - 1);
+}
+
+// Texels by layout, so that the number of channels is decided once for all four taps.
+template <size_t channels>
+struct ByteTexels {
+  const uint8_t* data;
+  const float* colour;
+  Vec4 operator()(size_t index) const {
+    const uint8_t* p = data + index * channels;
+    const float alpha = channels % 2 == 0 ? static_cast<float>(p[channels - 1]) * (1 / 255.0f) : 1.0f;
+    if constexpr (channels >= 3) return {colour[p[0]], colour[p[1]], colour[p[2]], alpha};
+    return {colour[p[0]], colour[p[0]], colour[p[0]], alpha};
+  }
+};
+
+template <size_t channels>
+struct FloatTexels {
+  const float* data;
+  Vec4 operator()(size_t index) const {
+    const float* p = data + index * channels;
+    const float alpha = channels % 2 == 0 ? p[channels - 1] : 1.0f;
+    if constexpr (channels >= 3) return {p[0], p[1], p[2], alpha};
+    return {p[0], p[0], p[0], alpha};
+  }
+};
+
+std::string oneLine(std::string text) {
+  while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+// The name that selects a reader; files in glTF buffers have none, so their first bytes decide.
+std::string formatName(const uint8_t* data, size_t bytes) {
+  const auto begins = [&](const char* magic, size_t length, size_t at = 0) {
+    return bytes >= at + length && std::memcmp(data + at, magic, length) == 0;
+  };
+  if (begins("\x89PNG", 4)) return "image.png";
+  if (begins("\xFF\xD8\xFF", 3)) return "image.jpg";
+  if (begins("RIFF", 4) && begins("WEBP", 4, 8)) return "image.webp";
+  if (begins("#?", 2)) return "image.hdr";
+  if (begins("\x76\x2f\x31\x01", 4)) return "image.exr";
+  if (begins("II*\0", 4) || begins("MM\0*", 4)) return "image.tif";
+  if (begins("BM", 2)) return "image.bmp";
+  if (begins("\xABKTX 20", 7))
+    throw Error(ExitCode::BadInput, "is a KTX2 image, which is not supported; convert it to PNG, JPEG or WebP");
+  throw Error(ExitCode::BadInput, "is not an image of a known format; save it as PNG or JPEG");
+}
+
+using InputPointer = std::unique_ptr<OIIO::ImageInput>;
+
+InputPointer openInput(const std::string& name, OIIO::Filesystem::IOProxy* proxy) {
+  OIIO::ImageSpec config;
+  // Alpha is coverage in glTF: colours must not be multiplied by it.
+  config.attribute("oiio:UnassociatedAlpha", 1);
+  InputPointer input = OIIO::ImageInput::create(name, false, &config, proxy);
+  const bool canProxy = input && (!proxy || input->supports("ioproxy"));
+  OIIO::ImageSpec spec;
+  if (canProxy && proxy) input->set_ioproxy(proxy);
+  if (canProxy && input->open(name, spec, config)) return input;
+  const std::string reason = canProxy ? oneLine(input->geterror()) : "no such format; " + oneLine(OIIO::geterror());
+  throw Error(ExitCode::BadInput, "is not an image that can be read (" + reason + "); save it as PNG or JPEG");
+}
+
+int keptChannels(const OIIO::ImageSpec& spec) {
+  if (spec.nchannels >= 4) return spec.alpha_channel == 3 ? 4 : 3;
+  if (spec.nchannels == 2) return spec.alpha_channel == 1 ? 2 : 1;
+  return spec.nchannels;
+}
+
+void checkSize(const OIIO::ImageSpec& spec) {
+  const std::string size = std::to_string(spec.width) + " x " + std::to_string(spec.height);
+  if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1) {
+    throw Error(ExitCode::BadInput, "is an image of " + size + " pixels; save it as a flat picture");
+  }
+  if (static_cast<uint64_t>(spec.width) * static_cast<uint64_t>(spec.height) > kMaxPixels) {
+    throw Error(ExitCode::BadInput, "is an image of " + size + " pixels, more than 2^28; make it smaller");
+  }
+}
+
+std::shared_ptr<const Image> readPixels(OIIO::ImageInput& input, const std::string& name) {
+  const OIIO::ImageSpec spec = input.spec();
+  checkSize(spec);
+  auto image = std::make_shared<Image>();
+  image->name = name;
+  image->width = spec.width;
+  image->height = spec.height;
+  image->channels = keptChannels(spec);
+  const size_t values =
+      static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height) * static_cast<size_t>(image->channels);
+  const bool isByte = spec.format == OIIO::TypeDesc::UINT8;
+  void* out = nullptr;
+  if (isByte) {
+    image->bytes.resize(values);
+    out = image->bytes.data();
+  } else {
+    image->floats.resize(values);
+    image->integerFloats = !spec.format.is_floating_point();
+    out = image->floats.data();
+  }
+  if (!input.read_image(0, 0, 0, image->channels, isByte ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT, out)) {
+    throw Error(ExitCode::BadInput, "is a broken image (" + oneLine(input.geterror()) + "); save it again");
+  }
+  for (float& v : image->floats) {
+    if (!std::isfinite(v)) v = 0;
+  }
+  return image;
+}
+
+}  // namespace
+
+Texture::Texture(std::shared_ptr<const Image> image, bool srgb, Wrap wrapU, Wrap wrapV, Filter filter)
+    : image_(std::move(image)), srgb_(srgb), wrapU_(wrapU), wrapV_(wrapV), filter_(filter) {
+  BRAID_ASSERT(image_ && image_->width > 0 && image_->height > 0 && image_->channels >= 1 && image_->channels <= 4);
+  if (srgb && image_->integerFloats) image_ = decodedFromSrgb(*image_);
+  width_ = image_->width;
+  height_ = image_->height;
+  channels_ = image_->channels;
+  if (!image_->bytes.empty()) {
+    bytes_ = image_->bytes.data();
+    colourTable_ = srgb ? byteTables().srgb.data() : byteTables().linear.data();
+  } else {
+    floats_ = image_->floats.data();
+  }
+}
+
+template <class Texels>
+inline Vec4 Texture::filtered(const Texels& texels, Vec2 uv) const {
+  const auto stride = static_cast<size_t>(width_);
+  if (filter_ == Filter::Nearest) {
+    const auto row = static_cast<size_t>(nearestTap(uv.y, wrapV_, height_)) * stride;
+    return texels(row + static_cast<size_t>(nearestTap(uv.x, wrapU_, width_)));
+  }
+  const Taps u = linearTaps(uv.x, wrapU_, width_), v = linearTaps(uv.y, wrapV_, height_);
+  const size_t upper = static_cast<size_t>(v.first) * stride, lower = static_cast<size_t>(v.second) * stride;
+  const auto left = static_cast<size_t>(u.first), right = static_cast<size_t>(u.second);
+  const Vec4 a = texels(upper + left) * (1 - u.weight) + texels(upper + right) * u.weight;
+  const Vec4 b = texels(lower + left) * (1 - u.weight) + texels(lower + right) * u.weight;
+  return a * (1 - v.weight) + b * v.weight;
+}
+
+Vec4 Texture::sample(Vec2 uv) const {
+  if (bytes_) {
+    switch (channels_) {
+      case 1:
+        return filtered(ByteTexels<1>{bytes_, colourTable_}, uv);
+      case 2:
+        return filtered(ByteTexels<2>{bytes_, colourTable_}, uv);
+      case 3:
+        return filtered(ByteTexels<3>{bytes_, colourTable_}, uv);
+      default:
+        return filtered(ByteTexels<4>{bytes_, colourTable_}, uv);
+    }
+  }
+  switch (channels_) {
+    case 0:
+      return Vec4(1);  // a texture without an image
+    case 1:
+      return filtered(FloatTexels<1>{floats_}, uv);
+    case 2:
+      return filtered(FloatTexels<2>{floats_}, uv);
+    case 3:
+      return filtered(FloatTexels<3>{floats_}, uv);
+    default:
+      return filtered(FloatTexels<4>{floats_}, uv);
+  }
+}
+
+size_t Texture::bytes() const { return image_ ? image_->bytes.size() + image_->floats.size() * sizeof(float) : 0; }
+
+std::shared_ptr<const Image> decodeImage(const uint8_t* data, size_t bytes, const std::string& name) {
+  if (bytes == 0) throw Error(ExitCode::BadInput, "is an empty image; save it again");
+  const std::string format = formatName(data, bytes);
+  OIIO::Filesystem::IOMemReader reader(data, bytes);
+  const InputPointer input = openInput(format, &reader);
+  return readPixels(*input, name);
+}
+
+std::shared_ptr<const Image> readImageFile(const std::string& path) {
+  if (!OIIO::Filesystem::is_regular(path))
+    throw Error(ExitCode::BadInput, path + ": is not a file that can be read; check the path");
+  try {
+    const InputPointer input = openInput(path, nullptr);
+    return readPixels(*input, path);
+  } catch (const Error& error) {
+    throw Error(error.code(), path + ": " + error.what());
+  }
+}
+
+}  // namespace braid

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a scene contains, as numbers and flags: the Plan decides from these what may be left out.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "renderer/core/vec.h"
+
+namespace braid {
+
+enum TraitFlags : uint32_t {
+  kTraitTextures = 1u << 0,
+  kTraitNormalMaps = 1u << 1,
+  kTraitAlphaMask = 1u << 2,
+  kTraitAlphaBlend = 1u << 3,
+  kTraitCulledFaces = 1u << 4,       // single-sided open surfaces
+  kTraitSpecular = 1u << 5,          // any GGX reflection
+  kTraitTransmission = 1u << 6,
+  kTraitVolume = 1u << 7,            // attenuation or refraction inside closed solids
+  kTraitDiffuseTransmission = 1u << 8,
+  kTraitClearcoat = 1u << 9,
+  kTraitSheen = 1u << 10,
+  kTraitAnisotropy = 1u << 11,
+  kTraitIridescence = 1u << 12,
+  kTraitVertexColors = 1u << 13,
+  kTraitTextureTransforms = 1u << 14,
+  kTraitInstances = 1u << 15,
+  kTraitEmissiveTriangles = 1u << 16,
+  kTraitPointLights = 1u << 17,      // point and spot
+  kTraitDirectionalLights = 1u << 18,
+  kTraitEnvironment = 1u << 19,
+  kTraitEnvironmentImage = 1u << 20,
+  kTraitSmoothSpecular = 1u << 21,   // roughness < 0.1 on a metal, clearcoat or transmissive surface: may cast caustics
+  kTraitUnlit = 1u << 22,
+};
+
+struct SceneTraits {
+  uint32_t flags = 0;
+  uint64_t triangles = 0, instancedTriangles = 0;
+  uint64_t emissiveTriangles = 0;
+  uint64_t punctualLights = 0;
+  uint64_t instances = 0, meshes = 0, materials = 0, textures = 0;
+  float smallestEmitterArea = 0;  // m², 0 when none
+  Vec3 centre{0};                 // bounding sphere of the scene, metres
+  float radius = 0;
+
+  bool has(uint32_t flag) const { return (flags & flag) != 0; }
+  bool isSupersetOf(const SceneTraits& other) const { return (flags & other.flags) == other.flags; }
+  // The names of the set flags.
+  std::vector<std::string> names() const;
+};
+
+}  // namespace braid

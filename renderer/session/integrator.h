@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// An integrator renders passes: one sample per pixel each, a pure function of (scene, plan, pass index, seed).
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "renderer/film/film.h"
+#include "renderer/session/plan.h"
+#include "renderer/transport/context.h"
+
+namespace braid {
+
+// Whether a scene needs an integrator, and why.
+struct Applies {
+  bool yes = true;
+  std::string reason;
+};
+
+// Counts of one pass, for reports. Sums over tiles; order does not matter.
+struct PassStatistics {
+  std::atomic<uint64_t> paths{0}, rays{0}, shadowRays{0};
+};
+
+struct PassRequest {
+  const TransportContext& context;
+  const Plan& plan;
+  uint64_t pass = 0;
+  const std::atomic<bool>* cancel = nullptr;      // checked per tile; a cancelled pass is discarded
+  PassStatistics* statistics = nullptr;
+  std::vector<std::vector<RecordedRay>>* record = nullptr;  // per tile, for benchmarks; usually null
+};
+
+class Integrator {
+ public:
+  virtual ~Integrator() = default;
+  virtual const char* name() const = 0;
+  virtual const char* description() const = 0;
+  virtual bool unbiased() const { return true; }
+  virtual bool splats() const { return false; }
+  virtual Applies applies(const SceneTraits& traits) const = 0;
+  // Renders pass `request.pass` of the plan's window into the target. Returns false when cancelled.
+  virtual bool renderPass(const PassRequest& request, PassTarget& target) const = 0;
+};
+
+}  // namespace braid

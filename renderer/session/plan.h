@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// What will run and what is left out, with a reason for each: a pure function of the scene's traits and the settings.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "renderer/scene/camera.h"
+#include "renderer/scene/scene.h"
+#include "renderer/session/settings.h"
+
+namespace braid {
+
+class Integrator;
+
+struct PlanLine {
+  bool kept = true;
+  std::string subject;  // e.g. "pt", "alpha filter"
+  std::string reason;
+};
+
+struct PlannedIntegrator {
+  const Integrator* integrator = nullptr;
+  int passesPerRound = 1;
+};
+
+struct Plan {
+  Settings settings;
+  Camera camera;
+  PixelWindow window;
+  int buckets = 2;
+  bool features = true;
+  std::vector<PlannedIntegrator> integrators;
+  std::vector<PlanLine> lines;
+  uint64_t filmBytesPerPixel = 0;
+
+  // "+ subject: reason" for what is kept, "- subject: reason" for what is left out, one line each.
+  std::string text() const;
+  uint64_t hash() const;
+};
+
+// `available` are the registered integrators. Throws Error(Usage) naming an unknown integrator and the known ones.
+Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& settings, const std::vector<const Integrator*>& available);
+
+}  // namespace braid

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/transport/hit.h"
+
+#include <algorithm>
+#include <bit>
+
+namespace braid {
+
+namespace {
+
+// Bound on the relative error of n rounded operations (Higham 2002; Pharr et al. 2023, section 6.8.1).
+constexpr float gammaBound(float n) {
+  constexpr float unit = 0.5f * std::numeric_limits<float>::epsilon();
+  return n * unit / (1 - n * unit);
+}
+
+// The next float from x in the direction of the sign of `towards` (x itself for 0): std::nextafter without the library call.
+float roundAway(float x, float towards) {
+  const auto bits = std::bit_cast<uint32_t>(x);
+  if (towards == 0 || !std::isfinite(x)) return x;
+  if (x == 0) return std::copysign(std::numeric_limits<float>::denorm_min(), towards);
+  return std::bit_cast<float>((towards > 0) == (x > 0) ? bits + 1 : bits - 1);
+}
+
+// Tangent-space normal of a map: x, y scaled, then unit.
+Vec3 mapNormal(const Vec4& texel, float scale) {
+  const Vec3 n((2 * texel.x - 1) * scale, (2 * texel.y - 1) * scale, 2 * texel.z - 1);
+  const float length = glm::length(n);
+  return length > 0 && std::isfinite(length) ? n / length : Vec3(0, 0, 1);
+}
+
+Frame tangentFrame(const Vec3& normal, const Vec4& tangent) {
+  const Vec3 t = Vec3(tangent) - normal * glm::dot(normal, Vec3(tangent));
+  const float length = glm::length(t);
+  if (!(length > 1e-6f)) return Frame(normal);
+  const Vec3 s = t / length;
+  return Frame(s, glm::cross(normal, s) * (tangent.w < 0 ? -1.0f : 1.0f), normal);
+}
+
+}  // namespace
+
+void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit& hit) {
+  const TriangleMesh& mesh = scene.mesh(query.mesh);
+  const glm::uvec3 index = mesh.triangles[query.triangle];
+  const float u = query.u, v = query.v, w = 1 - u - v;
+  const Vec3 &p0 = mesh.positions[index.x], &p1 = mesh.positions[index.y], &p2 = mesh.positions[index.z];
+  hit.mesh = &mesh;
+  hit.material = &scene.material(mesh);
+  hit.meshIndex = query.mesh;
+  hit.triangle = query.triangle;
+  hit.instance = query.instance;
+  hit.u = u;
+  hit.v = v;
+  hit.distance = query.t;
+  hit.wo = -direction;
+
+  const Vec3 a = w * p0, b = u * p1, c = v * p2;
+  hit.position = a + b + c;
+  hit.positionError = gammaBound(9) * (glm::abs(a) + glm::abs(b) + glm::abs(c));
+  Vec3 ng = glm::cross(p1 - p0, p2 - p0);
+  Vec3 ns = mesh.normals.empty() ? ng : interpolate(mesh.normals, index, u, v);
+  Vec4 tangent = mesh.tangents.empty() ? Vec4(0) : interpolate(mesh.tangents, index, u, v);
+
+  if (query.instance != kNoInstance) {
+    const GroupInstance& instance = scene.instances()[query.instance];
+    const Mat3 linear(instance.toWorld);
+    const Mat3 absolute(glm::abs(linear[0]), glm::abs(linear[1]), glm::abs(linear[2]));
+    const Vec3 translation(instance.toWorld[3]);
+    hit.positionError = (1 + gammaBound(3)) * (absolute * hit.positionError) +
+                        gammaBound(4) * (absolute * glm::abs(hit.position) + glm::abs(translation));
+    hit.position = linear * hit.position + translation;
+    // Normals go by the inverse transpose; that keeps the front side also in a mirrored instance.
+    const Mat3 normalMatrix = glm::transpose(Mat3(instance.toObject));
+    ng = normalMatrix * ng;
+    ns = normalMatrix * ns;
+    tangent = Vec4(linear * Vec3(tangent), glm::determinant(linear) < 0 ? -tangent.w : tangent.w);
+  }
+
+  // Triangles of 10⁻⁸ m have a cross product that underflows when squared, so scale before normalising.
+  const float largest = std::max({std::abs(ng.x), std::abs(ng.y), std::abs(ng.z)});
+  ng = largest > 0 ? glm::normalize(ng / largest) : hit.wo;
+  hit.front = glm::dot(hit.wo, ng) >= 0;
+  if (mesh.normals.empty()) {
+    ns = ng;
+  } else {
+    const float length2 = glm::dot(ns, ns);
+    ns = length2 > 0 && std::isfinite(length2) ? ns * (1 / std::sqrt(length2)) : ng;
+    if (glm::dot(ns, ng) < 0) ns = -ns;
+  }
+  hit.smoothNormal = ns;
+
+  const Material& material = *hit.material;
+  if (mesh.tangents.empty()) {
+    hit.frame = Frame(hit.front ? ns : -ns);
+  } else {
+    Frame frame = tangentFrame(ns, tangent);
+    if (material.normalTexture) {
+      const Vec3 local = mapNormal(scene.lookup(material.normalTexture, mesh, query.triangle, u, v), material.normalScale);
+      // Shading must stay consistent with geometry: a mapped normal below the surface would mirror light into it.
+      const Vec3 mapped = frame.toWorld(local);
+      if (glm::dot(mapped, ng) > 1e-3f) frame = tangentFrame(glm::normalize(mapped), Vec4(frame.s, tangent.w));
+    }
+    if (!hit.front) frame = Frame(frame.s, -frame.t, -frame.n);
+    hit.frame = frame;
+  }
+  hit.ng = hit.front ? ng : -ng;
+  if (!hit.front) hit.smoothNormal = -hit.smoothNormal;
+}
+
+Vec3 offsetOrigin(const Vec3& position, const Vec3& error, const Vec3& ng, const Vec3& direction) {
+  // Embree's own test has rounding errors of the size of the triangle's coordinates too, hence the factor.
+  const float d = 4 * glm::dot(glm::abs(ng), error);
+  Vec3 offset = d * ng;
+  if (glm::dot(direction, ng) < 0) offset = -offset;
+  Vec3 origin = position + offset;
+  for (int i = 0; i < 3; ++i) origin[i] = roundAway(origin[i], offset[i]);
+  return origin;
+}
+
+uint32_t materialLobes(const Material& m) {
+  uint32_t lobes = 0;
+  if (m.specularGlossiness) return kLobeDiffuse | kLobeSpecular | kLobeSpecularGlossiness;
+  const bool allMetal = m.metallic >= 1 && !m.metallicRoughnessTexture;
+  const bool dielectric = !allMetal;
+  const bool allTransmission = m.transmission >= 1 && !m.transmissionTexture;
+  if (dielectric && !allTransmission) {
+    if (m.diffuseTransmission < 1 || m.diffuseTransmissionTexture) lobes |= kLobeDiffuse;
+    if (m.diffuseTransmission > 0) lobes |= kLobeDiffuseTransmission;
+  }
+  if (m.metallic > 0 || m.specular > 0 || m.transmission > 0) lobes |= kLobeSpecular;
+  if (dielectric && m.transmission > 0) lobes |= kLobeTransmission;
+  if (m.clearcoat > 0) lobes |= kLobeClearcoat;
+  if (maxComponent(m.sheenColor) > 0) lobes |= kLobeSheen;
+  if (m.iridescence > 0) lobes |= kLobeIridescence;
+  if (m.anisotropy != 0) lobes |= kLobeAnisotropy;
+  return lobes;
+}
+
+Spectrum baseColorAt(const Scene& scene, const Hit& hit) {
+  const Material& m = *hit.material;
+  Spectrum color = m.baseColor;
+  if (m.baseColorTexture) color *= Spectrum(scene.lookup(m.baseColorTexture, *hit.mesh, hit.triangle, hit.u, hit.v));
+  if (!hit.mesh->colors.empty()) color *= Spectrum(interpolate(hit.mesh->colors, hit.mesh->triangles[hit.triangle], hit.u, hit.v));
+  return color;
+}
+
+namespace {
+
+void evaluateLayers(const Scene& scene, const Hit& hit, SurfaceParameters& s) {
+  const Material& m = *hit.material;
+  const auto tex = [&](const TextureRef& ref) { return scene.lookup(ref, *hit.mesh, hit.triangle, hit.u, hit.v); };
+  if (s.lobes & kLobeClearcoat) {
+    s.clearcoat = m.clearcoat * (m.clearcoatTexture ? tex(m.clearcoatTexture).r : 1.0f);
+    s.clearcoatRoughness = m.clearcoatRoughness * (m.clearcoatRoughnessTexture ? tex(m.clearcoatRoughnessTexture).g : 1.0f);
+    Vec3 coat = hit.smoothNormal;
+    if (m.clearcoatNormalTexture && !hit.mesh->tangents.empty()) {
+      const Frame smooth(hit.frame.s - hit.smoothNormal * glm::dot(hit.frame.s, hit.smoothNormal), Vec3(0), hit.smoothNormal);
+      const Vec3 t = glm::normalize(smooth.s);
+      const Vec3 bitangent = glm::cross(hit.smoothNormal, t) * (glm::dot(glm::cross(hit.frame.n, hit.frame.s), hit.frame.t) < 0 ? -1.0f : 1.0f);
+      const Vec3 mapped = Frame(t, bitangent, hit.smoothNormal).toWorld(mapNormal(tex(m.clearcoatNormalTexture), m.clearcoatNormalScale));
+      if (glm::dot(mapped, hit.ng) > 1e-3f) coat = mapped;
+    }
+    s.clearcoatNormal = glm::normalize(hit.frame.toLocal(coat));
+  }
+  if (s.lobes & kLobeSheen) {
+    s.sheenColor = m.sheenColor * (m.sheenColorTexture ? Spectrum(tex(m.sheenColorTexture)) : Spectrum(1));
+    s.sheenRoughness = m.sheenRoughness * (m.sheenRoughnessTexture ? tex(m.sheenRoughnessTexture).a : 1.0f);
+  }
+  if (s.lobes & kLobeAnisotropy) {
+    s.anisotropy = m.anisotropy;
+    Vec2 direction(1, 0);
+    if (m.anisotropyTexture) {
+      const Vec4 t = tex(m.anisotropyTexture);
+      direction = Vec2(2 * t.r - 1, 2 * t.g - 1);
+      s.anisotropy *= t.b;
+    }
+    const float c = std::cos(m.anisotropyRotation), si = std::sin(m.anisotropyRotation);
+    direction = Vec2(c * direction.x - si * direction.y, si * direction.x + c * direction.y);
+    const float length = glm::length(direction);
+    s.anisotropyDirection = length > 0 ? direction / length : Vec2(1, 0);
+    // The frame's bitangent is turned on back faces.
+    if (!hit.front) s.anisotropyDirection.y = -s.anisotropyDirection.y;
+  }
+  if (s.lobes & kLobeIridescence) {
+    s.iridescence = m.iridescence * (m.iridescenceTexture ? tex(m.iridescenceTexture).r : 1.0f);
+    s.iridescenceIor = m.iridescenceIor;
+    const float t = m.iridescenceThicknessTexture ? tex(m.iridescenceThicknessTexture).g : 1.0f;
+    s.iridescenceThickness = m.iridescenceThicknessMin + (m.iridescenceThicknessMax - m.iridescenceThicknessMin) * t;
+  }
+}
+
+}  // namespace
+
+SurfaceParameters surfaceAt(const Scene& scene, const Hit& hit, uint32_t lobes, float etaOutside) {
+  const Material& m = *hit.material;
+  const auto tex = [&](const TextureRef& ref) { return scene.lookup(ref, *hit.mesh, hit.triangle, hit.u, hit.v); };
+  SurfaceParameters s;
+  s.lobes = lobes;
+  s.baseColor = baseColorAt(scene, hit);
+  if (lobes == kLobeDiffuse) return s;
+
+  s.metallic = m.metallic;
+  s.roughness = m.roughness;
+  if (m.metallicRoughnessTexture) {
+    const Vec4 t = tex(m.metallicRoughnessTexture);
+    s.roughness *= t.g;
+    s.metallic *= t.b;
+  }
+  s.etaInside = m.ior;
+  s.etaOutside = etaOutside;
+  s.entering = hit.front;
+  s.thinWalled = m.thinWalled;
+  s.specular = m.specular * (m.specularTexture ? tex(m.specularTexture).a : 1.0f);
+  s.specularColor = m.specularColor * (m.specularColorTexture ? Spectrum(tex(m.specularColorTexture)) : Spectrum(1));
+  if (lobes & kLobeSpecularGlossiness) {
+    s.metallic = 0;
+    s.specularF0 = m.specularF0;
+    if (m.specularGlossinessTexture) {
+      const Vec4 t = tex(m.specularGlossinessTexture);
+      s.specularF0 *= Spectrum(t);
+      s.roughness = 1 - (1 - m.roughness) * t.a;
+    }
+  }
+  if (lobes & kLobeTransmission) s.transmission = m.transmission * (m.transmissionTexture ? tex(m.transmissionTexture).r : 1.0f);
+  if (lobes & kLobeDiffuseTransmission) {
+    s.diffuseTransmission = m.diffuseTransmission * (m.diffuseTransmissionTexture ? tex(m.diffuseTransmissionTexture).a : 1.0f);
+    s.diffuseTransmissionColor =
+        m.diffuseTransmissionColor * (m.diffuseTransmissionColorTexture ? Spectrum(tex(m.diffuseTransmissionColorTexture)) : Spectrum(1));
+  }
+  if (lobes & (kLobeClearcoat | kLobeSheen | kLobeAnisotropy | kLobeIridescence)) evaluateLayers(scene, hit, s);
+  return s;
+}
+
+}  // namespace braid

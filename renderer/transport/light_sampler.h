@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Next-event estimation: picks a light and a point or direction on it. Lights are numbered: emissive triangles first, then punctual lights with
+// a position; directional lights and the environment are separate categories.
+#pragma once
+
+#include <vector>
+
+#include "renderer/core/vec.h"
+#include "renderer/scene/scene.h"
+#include "renderer/transport/light_tree.h"
+
+namespace braid {
+
+struct LightSample {
+  Vec3 wi;                // unit, from the shading point to the light
+  float distance = 0;     // metres; infinity for directional lights and the environment
+  Spectrum radiance{0};   // arriving along wi, before visibility. Delta lights: already divided by distance²
+  float pdfW = 0;         // density per solid angle including the choice of the light; for delta lights the probability of the choice
+  bool delta = false;
+};
+
+// How finite lights are chosen.
+enum class LightStrategy { Automatic, Power, Hierarchy };
+
+class LightSampler {
+ public:
+  // Automatic: by power for up to 4 finite lights, where a hierarchy cannot pay, else by the hierarchy.
+  LightSampler(const Scene& scene, LightStrategy strategy);
+
+  // Samples a light for the point p with shading normal n; `twoSided`: the surface transmits. False: no light can contribute.
+  bool sample(const Vec3& p, const Vec3& n, bool twoSided, float uSelect, Vec2 u, LightSample& out) const;
+
+  // Density with which sample() would pick the direction to a point hit on emitter `index` (distance in metres, cosine at the light > 0).
+  float pdfEmitter(const Vec3& p, const Vec3& n, bool twoSided, size_t index, float distance, float cosLight) const;
+  float pdfEnvironment(const Vec3& direction) const;
+
+  size_t finiteLights() const { return finite_; }
+  bool usesHierarchy() const { return hierarchy_; }
+  size_t bytes() const { return tree_.bytes() + cumulative_.size() * sizeof(float); }
+
+ private:
+  bool sampleEmitter(const EmissiveTriangle& e, const Vec3& p, Vec2 u, LightSample& out) const;
+  bool samplePunctual(const PunctualLight& light, const Vec3& p, LightSample& out) const;
+  float finiteProbability(const Vec3& p, const Vec3& n, bool twoSided, size_t light) const;
+
+  const Scene& scene_;
+  size_t finite_ = 0;
+  bool hierarchy_ = false;
+  LightTree tree_;
+  std::vector<float> cumulative_;        // by power, when there is no hierarchy
+  std::vector<uint32_t> positional_;     // punctual lights with a position
+  std::vector<uint32_t> directional_;
+  std::vector<float> directionalCumulative_;
+  float probabilityFinite_ = 0, probabilityDirectional_ = 0, probabilityEnvironment_ = 0;
+};
+
+// Spot attenuation of KHR_lights_punctual for the cosine between the axis and the direction from the light, in [0, 1].
+float spotFalloff(const PunctualLight& light, float cosAngle);
+
+}  // namespace braid

@@ -1,0 +1,1 @@
+"""Procedural generator of the braid benchmark scenes."""

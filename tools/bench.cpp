@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+// `braid bench`: throughput as ratios within one run. The rays that a render traced are recorded and traced again by bare Embree calls; the ratio of
+// the two rates, and the share of the render that Embree's part would take, mean the same on every machine.
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include "integrators/registry.h"
+#include "tools/builtin_scenes.h"
+#include "tools/cli.h"
+#include "version.h"
+
+namespace braid {
+
+namespace {
+
+struct BenchOptions {
+  std::vector<std::string> scenes;
+  SampleChoice samples;
+  std::string size = "512x512", isa = "avx2";
+  int repeats = 5;
+  bool json = false;
+};
+
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+double median(std::vector<double> v) {
+  std::sort(v.begin(), v.end());
+  return v[v.size() / 2];
+}
+
+// Peak resident memory of the process in bytes, from /proc.
+uint64_t peakMemory() {
+  std::ifstream status("/proc/self/status");
+  std::string line;
+  while (std::getline(status, line))
+    if (line.rfind("VmHWM:", 0) == 0) return std::stoull(line.substr(6)) * 1024;
+  return 0;
+}
+
+// Traces one recorded ray by Embree alone.
+void traceRaw(RTCScene scene, const RecordedRay& r) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCRayHit query;
+  query.ray.org_x = r.origin.x;
+  query.ray.org_y = r.origin.y;
+  query.ray.org_z = r.origin.z;
+  query.ray.tnear = 0;
+  query.ray.dir_x = r.direction.x;
+  query.ray.dir_y = r.direction.y;
+  query.ray.dir_z = r.direction.z;
+  query.ray.time = 0;
+  query.ray.tfar = r.tmax;
+  query.ray.mask = ~0u;
+  query.ray.id = 0;
+  query.ray.flags = 0;
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  if (r.shadow) rtcOccluded1(scene, &context, &query.ray);
+  else rtcIntersect1(scene, &context, &query);
+}
+
+struct SceneSource {
+  std::string name;
+  std::function<SceneData()> load;
+};
+
+nlohmann::json benchScene(const SceneSource& source, const BenchOptions& o, const Settings& settings) {
+  const double loadStart = now();
+  SceneData data = source.load();
+  const double loadSeconds = now() - loadStart;
+  const CameraData camera = chooseCamera(data, {});
+  SceneOptions sceneOptions;
+  sceneOptions.isa = o.isa == "auto" ? "" : o.isa;
+  const Scene scene(std::move(data), sceneOptions);
+  const auto integrators = makeIntegrators();
+  const Plan plan = makePlan(scene, camera, settings, pointersTo(integrators));
+  const TransportContext context(scene, settings.lightStrategy);
+  const Integrator& integrator = *plan.integrators.front().integrator;
+
+  std::vector<double> renderRates, rawRates, ratios, pathRates, rawIncoherent;
+  uint64_t rayCount = 0;
+  tbb::task_arena arena(settings.threads > 0 ? settings.threads : tbb::task_arena::automatic);
+  arena.execute([&] {
+    PassTarget target(plan.window.width(), plan.window.height(), integrator.splats(), plan.features);
+    Accumulator film(plan.window.width(), plan.window.height(), plan.buckets);
+    std::vector<std::vector<RecordedRay>> recorded;
+    integrator.renderPass({context, plan, 0, nullptr, nullptr, &recorded}, target);
+    uint64_t recordedRays = 0;
+    for (const auto& tile : recorded) recordedRays += tile.size();
+    const uint64_t passes = std::max<uint64_t>(1, settings.spp / static_cast<uint64_t>(o.repeats));
+    // Each repeat times both, one after the other, so that a change of clock or load hits both alike.
+    for (int repeat = 0; repeat < o.repeats; ++repeat) {
+      PassStatistics statistics;
+      const double start = now();
+      for (uint64_t k = 0; k < passes; ++k) {
+        target.clear();
+        integrator.renderPass({context, plan, film.passes(), nullptr, &statistics, nullptr}, target);
+        film.commit(film.passes(), target);
+      }
+      const double renderSeconds = now() - start;
+      rayCount = (statistics.rays + statistics.shadowRays) / passes;
+      const double rawStart = now();
+      tbb::parallel_for(size_t(0), recorded.size(), [&](size_t i) {
+        for (const RecordedRay& r : recorded[i]) traceRaw(scene.accel().handle(), r);
+      });
+      const double rawSeconds = now() - rawStart;
+      const double renderRate = static_cast<double>(statistics.rays + statistics.shadowRays) / renderSeconds;
+      const double rawRate = static_cast<double>(recordedRays) / rawSeconds;
+      renderRates.push_back(renderRate);
+      rawRates.push_back(rawRate);
+      ratios.push_back(renderRate / rawRate);
+      pathRates.push_back(static_cast<double>(statistics.paths) / renderSeconds);
+    }
+  });
+  const auto pixels = static_cast<double>(plan.window.width()) * plan.window.height();
+  const double ratio = median(ratios);
+  const auto sceneBytes = static_cast<double>(scene.accel().bytes() + scene.geometryBytes());
+  return {{"scene", source.name},
+          {"triangles", scene.traits().triangles},
+          {"pathsPerSecond", median(pathRates)},
+          {"raysPerSecond", median(renderRates)},
+          {"rawRaysPerSecond", median(rawRates)},
+          {"ratio", ratio},
+          {"embreeShare", ratio},
+          {"raysPerPath", static_cast<double>(rayCount) / pixels},
+          {"loadSeconds", loadSeconds},
+          {"hierarchySeconds", scene.buildTimes().hierarchy},
+          {"hierarchyBytesPerTriangle", static_cast<double>(scene.accel().bytes()) / std::max<double>(1, static_cast<double>(scene.traits().triangles))},
+          {"sceneBytesPerTriangle", sceneBytes / std::max<double>(1, static_cast<double>(scene.traits().triangles))},
+          {"filmBytesPerPixel", plan.filmBytesPerPixel},
+          {"lightBytes", context.lights.bytes()},
+          {"peakMemoryBytes", peakMemory()}};
+}
+
+int runBench(const BenchOptions& o) {
+  SceneChoice view;
+  view.size = o.size;
+  Settings settings = makeSettings(view, o.samples);
+  settings.features = false;
+  std::vector<SceneSource> sources;
+  const std::vector<SceneSource> builtin{{"builtin:cornell", [] { return cornellBox(); }}, {"builtin:million", [] { return cornellBox(1'000'000); }}};
+  for (const std::string& file : o.scenes) {
+    const auto known = std::find_if(builtin.begin(), builtin.end(), [&](const SceneSource& b) { return b.name == file; });
+    if (known != builtin.end()) sources.push_back(*known);
+    else sources.push_back({file, [file] {
+                         SceneChoice choice;
+                         choice.file = file;
+                         return loadScene(choice);
+                            }});
+  }
+  if (sources.empty()) sources = builtin;
+  nlohmann::json all = nlohmann::json::array();
+  for (const SceneSource& source : sources) {
+    const nlohmann::json r = benchScene(source, o, settings);
+    all.push_back(r);
+    if (o.json) continue;
+    fmt::print("{}: {} triangles, {:.2f} rays a path\n", source.name, r["triangles"].dump(), r["raysPerPath"].get<double>());
+    fmt::print("  {:.2f} M paths/s, {:.2f} M rays/s; the same rays by Embree alone {:.2f} M rays/s: ratio {:.3f} (share of the time inside Embree)\n",
+               r["pathsPerSecond"].get<double>() * 1e-6, r["raysPerSecond"].get<double>() * 1e-6, r["rawRaysPerSecond"].get<double>() * 1e-6,
+               r["ratio"].get<double>());
+    fmt::print("  load {:.3f} s, hierarchies {:.3f} s, {:.1f} bytes a triangle in hierarchies, {:.1f} in all; film {} bytes a pixel; peak {:.0f} MiB\n",
+               r["loadSeconds"].get<double>(), r["hierarchySeconds"].get<double>(), r["hierarchyBytesPerTriangle"].get<double>(),
+               r["sceneBytesPerTriangle"].get<double>(), r["filmBytesPerPixel"].dump(), r["peakMemoryBytes"].get<double>() / 1048576.0);
+  }
+  if (o.json) fmt::print("{}\n", nlohmann::json({{"schema", 1}, {"build", BRAID_BUILD_FLAGS}, {"isa", o.isa}, {"results", all}}).dump(2));
+  return 0;
+}
+
+}  // namespace
+
+void addBench(CLI::App& app, Action& action) {
+  auto options = std::make_shared<BenchOptions>();
+  BenchOptions& o = *options;
+  o.samples.maxDepth = 10;
+  CLI::App* command = app.add_subcommand("bench", "Measure throughput against bare Embree rays in the same run");
+  command->footer("Example:\n  braid bench                 the built-in Cornell box and its million-triangle variant\n  braid bench scene.glb --json");
+  command->add_option("SCENE", o.scenes, "glTF files, builtin:cornell or builtin:million (default: both built-in ones)");
+  command->add_option("--size", o.size, "Frame, WIDTHxHEIGHT")->capture_default_str();
+  command->add_option("--repeats", o.repeats, "Interleaved measurements; the median counts")->capture_default_str()->check(CLI::Range(1, 1000));
+  command->add_option("--isa", o.isa, "Instruction set for Embree: avx2, avx512, sse4.2, or auto")->capture_default_str();
+  command->add_flag("--json", o.json, "As JSON");
+  addSampleOptions(*command, o.samples);
+  command->callback([options, &action] { action = [options] { return runBench(*options); }; });
+}
+
+}  // namespace braid

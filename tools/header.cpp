@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/header.h"
+
+#include <fmt/format.h>
+
+#include "renderer/core/hash.h"
+#include "renderer/session/pixel_filter.h"
+#include "version.h"
+
+namespace braid {
+
+namespace {
+
+Attribute text(const std::string& name, const std::string& value) {
+  Attribute a;
+  a.name = name;
+  a.text = value;
+  return a;
+}
+
+Attribute integer(const std::string& name, uint64_t value) {
+  Attribute a;
+  a.name = name;
+  a.kind = Attribute::Kind::Int;
+  a.integer = static_cast<int64_t>(value);
+  return a;
+}
+
+Attribute number(const std::string& name, double value) {
+  Attribute a;
+  a.name = name;
+  a.kind = Attribute::Kind::Float;
+  a.number = value;
+  return a;
+}
+
+Attribute matrix(const std::string& name, const Mat4& m) {
+  Attribute a;
+  a.name = name;
+  a.kind = Attribute::Kind::Matrix;
+  // OpenEXR multiplies row vectors from the left, so its rows are our columns.
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j) a.values.push_back(m[i][j]);
+  return a;
+}
+
+}  // namespace
+
+std::vector<Attribute> headerAttributes(const Scene& scene, const Session& session, const RenderResult& result, const std::string& isa, bool timing) {
+  const Plan& plan = session.plan();
+  const Settings& s = plan.settings;
+  std::vector<Attribute> list{
+      text("Software", std::string("braid ") + BRAID_VERSION),
+      text("braid/version", BRAID_VERSION),
+      text("braid/build", BRAID_BUILD_FLAGS),
+      text("braid/isa", isa),
+      text("braid/scene", scene.data().file),
+      text("braid/sceneHash", hexString(scene.data().contentHash)),
+      text("braid/plan", plan.text()),
+      text("braid/planHash", hexString(plan.hash())),
+      text("braid/seed", std::to_string(s.seed)),
+      text("braid/sampler", s.sampler == SamplerKind::Sobol ? "sobol" : "independent"),
+      text("braid/filter", toString(s.filter)),
+      integer("braid/maxDepth", static_cast<uint64_t>(s.maxDepth)),
+      text("braid/varianceIs", s.sampler == SamplerKind::Sobol ? "variance of the mean, rescaled from independent buckets" : "variance of the mean"),
+      integer("samplesPerPixel", result.estimates->estimates.front().passes),
+      integer("braid/rejectedSamples", result.rejected),
+      matrix("worldToCamera", plan.camera.worldToCamera()),
+      matrix("worldToNDC", plan.camera.worldToNdc()),
+  };
+  if (s.clamp > 0) list.push_back(number("braid/clamp", static_cast<double>(s.clamp)));
+  for (const Estimate& e : result.estimates->estimates) {
+    list.push_back(integer("braid/" + e.name + "/passes", e.passes));
+    if (timing) list.push_back(number("braid/" + e.name + "/seconds", e.seconds));
+  }
+  if (timing) list.push_back(number("renderTimeSeconds", result.seconds));
+  return list;
+}
+
+}  // namespace braid

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/lists.h"
+
+#include <fmt/format.h>
+
+#include "integrators/registry.h"
+#include "tools/metrics/metrics.h"
+
+namespace braid {
+
+int printLists() {
+  fmt::print("integrators\n");
+  for (const auto& i : makeIntegrators()) fmt::print("  {:<12} {}\n", i->name(), i->description());
+  fmt::print("metrics\n");
+  for (const Metric& m : metrics()) fmt::print("  {:<12} {}\n", m.name, m.description);
+  return 0;
+}
+
+}  // namespace braid

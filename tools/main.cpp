@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// The braid command line: one subcommand a file; errors end here as one line and an exit code.
+#include <cstdio>
+#include <new>
+
+#include <fmt/format.h>
+
+#include "renderer/core/error.h"
+#include "tools/cli.h"
+#include "tools/lists.h"
+#include "version.h"
+
+int main(int argc, char** argv) {
+  using namespace braid;
+  CLI::App app{"braid: renders glTF scenes to converged OpenEXR images on the CPU"};
+  app.set_version_flag("--version", std::string("braid ") + BRAID_VERSION + " (" + BRAID_BUILD_FLAGS + ")");
+  app.set_help_flag("-h,--help", "Print this help and exit");
+  app.require_subcommand(0, 1);
+  bool list = false;
+  app.add_flag("--list", list, "Print every registered integrator and metric");
+  Action action;
+  addRender(app, action);
+  addPlan(app, action);
+  addInfo(app, action);
+  addCompare(app, action);
+  addReplay(app, action);
+  addBench(app, action);
+
+  try {
+    app.parse(argc, argv);
+    if (list) return printLists();
+    if (!action) {
+      fmt::print("{}", app.help());
+      return static_cast<int>(ExitCode::Usage);
+    }
+    return action();
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : static_cast<int>(ExitCode::Usage);
+  } catch (const Error& e) {
+    fmt::print(stderr, "{}\n", e.what());
+    return static_cast<int>(e.code());
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "out of memory: lower --size or give the process more memory\n");
+    return static_cast<int>(ExitCode::OutOfMemory);
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "internal error: {}\n", e.what());
+    return static_cast<int>(ExitCode::Internal);
+  }
+}

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+// `braid render`: a glTF scene to a multilayer EXR.
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <unistd.h>
+
+#include <fmt/format.h>
+
+#include "integrators/registry.h"
+#include "renderer/core/error.h"
+#include "renderer/core/hash.h"
+#include "renderer/film/exr.h"
+#include "tools/cli.h"
+#include "tools/header.h"
+#include "tools/interrupt.h"
+#include "tools/progress_line.h"
+
+namespace braid {
+
+namespace {
+
+struct RenderOptions {
+  SceneChoice scene;
+  SampleChoice samples;
+  std::string output, png, aovs = "all", logJson, layerPrefix;
+  double exposure = 0;
+  bool quarters = false, floatHeadline = false, transparent = false, noTiming = false;
+};
+
+AovSet parseAovs(const std::string& name) {
+  if (name == "none") return AovSet::None;
+  if (name == "features") return AovSet::Features;
+  if (name == "all") return AovSet::All;
+  throw Error(ExitCode::Usage, "unknown --aovs '" + name + "': known are none, features, all");
+}
+
+// Finds out before hours of rendering that the result could not be saved.
+void checkWritable(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  const std::string name = folder.empty() ? "." : folder.string();
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(name, ignored))
+    throw Error(ExitCode::OutputFailed, fmt::format("{}: the folder {} does not exist: create it or choose another output", path, name));
+  if (access(name.c_str(), W_OK) != 0)
+    throw Error(ExitCode::OutputFailed, fmt::format("{}: the folder {} is not writable: {}", path, name, std::strerror(errno)));
+  if (std::filesystem::is_directory(path, ignored))
+    throw Error(ExitCode::OutputFailed, fmt::format("{}: is a folder: give a file name", path));
+}
+
+nlohmann::json resultRecord(const RenderResult& r, const RenderOptions& o, double loadSeconds, const Scene& scene, double writeSeconds) {
+  nlohmann::json outputs = nlohmann::json::array({o.output});
+  if (!o.png.empty()) outputs.push_back(o.png);
+  return {{"status", r.reason == StopReason::Cancelled ? "interrupted" : "done"},
+          {"reason", toString(r.reason)},
+          {"spp", r.estimates->estimates.front().passes},
+          {"seconds", {{"load", loadSeconds}, {"prepare", scene.buildTimes().prepare}, {"hierarchy", scene.buildTimes().hierarchy},
+                       {"render", r.seconds}, {"write", writeSeconds}}},
+          {"paths", r.paths},
+          {"rays", r.rays + r.shadowRays},
+          {"rejectedSamples", r.rejected},
+          {"outputs", outputs}};
+}
+
+int runRender(const RenderOptions& o) {
+  const AovSet aovs = parseAovs(o.aovs);
+  Settings settings = makeSettings(o.scene, o.samples);
+  settings.features = aovs != AovSet::None;
+  settings.quarters = o.quarters;
+  settings.transparent = o.transparent;
+  checkWritable(o.output);
+  if (!o.png.empty()) checkWritable(o.png);
+  JsonLog json(o.logJson);
+  const std::atomic<bool>& interrupted = installInterruptHandler();
+
+  LoadTimes times;
+  SceneData data = loadScene(o.scene, &times);
+  const CameraData camera = chooseCamera(data, o.scene);
+  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene);
+  const auto integrators = makeIntegrators();
+  Session session(*scene, makePlan(*scene, camera, settings, pointersTo(integrators)));
+  if (o.scene.verbose) fmt::print(stderr, "{}", session.plan().text());
+  json.write("plan", {{"text", session.plan().text()}, {"hash", hexString(session.plan().hash())}});
+
+  ProgressLine line(o.scene.quiet);
+  RenderResult result = session.run(
+      [&](const Progress& p) {
+        line.update(p);
+        json.write("progress", {{"spp", p.round}, {"seconds", p.seconds}, {"secondsLeft", p.secondsLeft}});
+        return true;
+      },
+      &interrupted);
+  line.finish();
+
+  Estimates estimates = *result.estimates;
+  estimates.attributes = headerAttributes(*scene, session, result, scene->accel().isa(), !o.noTiming);
+  ExrOptions exr;
+  exr.aovs = aovs;
+  exr.quarters = o.quarters;
+  exr.floatHeadline = o.floatHeadline;
+  exr.layerPrefix = o.layerPrefix;
+  const auto writeStart = std::chrono::steady_clock::now();
+  const WriteReport report = writeExr(o.output, estimates, result.image, result.alpha ? &*result.alpha : nullptr, exr);
+  if (!o.png.empty()) writePng(o.png, result.image, static_cast<float>(o.exposure));
+  const double writeSeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - writeStart).count();
+
+  if (!o.scene.quiet) {
+    if (report.clampedToHalf > 0)
+      fmt::print(stderr, "warning: {}: {} headline values above 65504 were clamped to fit half floats: use --float\n", o.output, report.clampedToHalf);
+    if (result.rejected > 0) fmt::print(stderr, "warning: {} non-finite or negative samples counted as 0\n", result.rejected);
+    fmt::print(stderr, "{} spp in {} ({:.2f} M paths/s, {:.1f} M rays/s), stopped by {}\n", result.estimates->estimates.front().passes,
+               formatSeconds(result.seconds), static_cast<double>(result.paths) / result.seconds * 1e-6,
+               static_cast<double>(result.rays + result.shadowRays) / result.seconds * 1e-6, toString(result.reason));
+    fmt::print(stderr, "Saved: {}\n", o.output);
+    if (!o.png.empty()) fmt::print(stderr, "Saved: {}\n", o.png);
+  }
+  json.write("end", resultRecord(result, o, times.load, *scene, writeSeconds));
+  return result.reason == StopReason::Cancelled ? static_cast<int>(ExitCode::Interrupted) : 0;
+}
+
+}  // namespace
+
+void addRender(CLI::App& app, Action& action) {
+  auto options = std::make_shared<RenderOptions>();
+  RenderOptions& o = *options;
+  CLI::App* command = app.add_subcommand("render", "Render a scene to an EXR image");
+  command->footer("Examples:\n  braid render scene.glb -o out.exr --spp 256\n  braid render scene.glb -o out.exr --time 2m --env sky.hdr --png out.png");
+  addSceneOptions(*command, o.scene);
+  addSampleOptions(*command, o.samples);
+  command->add_option("-o,--output", o.output, "EXR file to write")->required();
+  command->add_option("--png", o.png, "Also write a tone-mapped PNG");
+  command->add_option("--exposure", o.exposure, "Exposure of the PNG in stops")->capture_default_str();
+  command->add_option("--aovs", o.aovs, "Layers besides the image: none, features or all")->capture_default_str();
+  command->add_flag("--quarters", o.quarters, "Also write the four quarter buffers");
+  command->add_flag("--float", o.floatHeadline, "R G B as 32-bit floats");
+  command->add_flag("--transparent", o.transparent, "Alpha channel; camera rays that miss add nothing");
+  command->add_option("--layer-prefix", o.layerPrefix, "Put before every layer's name, e.g. ViewLayer");
+  command->add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
+  command->add_option("--log-json", o.logJson, "Progress and result as JSON lines, to a file or - for standard output");
+  command->callback([options, &action] { action = [options] { return runRender(*options); }; });
+}
+
+}  // namespace braid
