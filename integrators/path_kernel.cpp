@@ -198,6 +198,7 @@ void PathKernel::run() {
       PathState& path = path_[i];
       if (filtered_) path.salt = sampler_.salt(path.key, static_cast<uint32_t>(path.segments + path.nullCrossings));
       if (record_) record_->push_back({path.origin, path.direction, kInfinity, path.salt, false});
+      if (observer_) observer_->onRay(path);
       found_[i] = scene_.accel().intersect(path.origin, path.direction, kInfinity, path.salt, query_[i]);
     }
     rays += static_cast<uint64_t>(activeCount);
@@ -215,7 +216,9 @@ void PathKernel::run() {
     for (size_t k = 0; k < shadows; ++k) {
       const ShadowRay& ray = shadow[k];
       if (record_) record_->push_back({ray.origin, ray.direction, ray.tmax, ray.salt, true});
-      if (scene_.accel().occluded(ray.origin, ray.direction, ray.tmax, ray.salt)) continue;
+      const bool visible = !scene_.accel().occluded(ray.origin, ray.direction, ray.tmax, ray.salt);
+      if (observer_) observer_->onLight(ray, visible);
+      if (!visible) continue;
       PathSample& sample = sample_[static_cast<size_t>(shadowPath[k])];
       sample.radiance += ray.contribution;
       if (ray.forFeatures) sample.features.visibility = 1;
@@ -227,11 +230,13 @@ void PathKernel::run() {
 
 bool PathKernel::shade(PathState& path, bool hitSomething, const RayHit& query, PathSample& sample, ShadowRay& shadow, bool& hasShadow) {
   if (!hitSomething) {
+    if (observer_) observer_->onMiss();
     addEnvironment(path, sample);
     return false;
   }
   Hit hit;
   makeHit(scene_, query, path.direction, hit);
+  if (observer_) observer_->onHit(hit);
   const Material& material = *hit.material;
   attenuate(path, hit.distance);
   if (material.hasVolume() && crossNullInterface(path, hit)) return path.nullCrossings < kMaxNullCrossings;

@@ -28,6 +28,16 @@ struct ShadowRay {
   bool forFeatures;       // also the visibility feature
 };
 
+// Sees the steps of a path, for replay.
+class PathObserver {
+ public:
+  virtual ~PathObserver() = default;
+  virtual void onRay(const PathState& path) = 0;
+  virtual void onMiss() = 0;
+  virtual void onHit(const Hit& hit) = 0;
+  virtual void onLight(const ShadowRay& ray, bool visible) = 0;
+};
+
 // Traces many paths in step: all find their next surface, then all are shaded, then all shadow rays run. Shading one path does not wait for another's
 // memory or divisions, which a path followed alone would (1.4x the speed); the result of a path does not depend on its companions.
 class PathKernel {
@@ -44,6 +54,7 @@ class PathKernel {
   void run();
   const PathSample& sample(int i) const { return sample_[static_cast<size_t>(i)]; }
   void clear() { count_ = 0; }
+  void observe(PathObserver* observer) { observer_ = observer; }
 
   uint64_t rays = 0, shadowRays = 0;
 
@@ -65,6 +76,7 @@ class PathKernel {
   const Plan& plan_;
   const PassSampler& sampler_;
   std::vector<RecordedRay>* record_;
+  PathObserver* observer_ = nullptr;
   bool wantFeatures_, filtered_;
 
   int count_ = 0;

@@ -16,9 +16,14 @@ class PathTracer final : public Integrator {
   const char* description() const override { return "path tracing, next-event estimation and BSDF sampling with the power heuristic"; }
   Applies applies(const SceneTraits&) const override { return {true, "unbiased for every scene"}; }
 
+  std::unique_ptr<PassSampler> pixelSampler(const Plan& plan, uint64_t pass) const override {
+    return std::make_unique<PassSampler>(plan.settings.sampler, plan.settings.seed, kStream, pass);
+  }
+
   bool renderPass(const PassRequest& request, PassTarget& target) const override {
     const Plan& plan = request.plan;
-    const PassSampler sampler(plan.settings.sampler, plan.settings.seed, kStream, request.pass);
+    const std::unique_ptr<PassSampler> passSampler = pixelSampler(plan, request.pass);
+    const PassSampler& sampler = *passSampler;
     return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>* record) {
       PathKernel kernel(request.context, plan, sampler, record);
       const int pixels = tile.width() * tile.height();
@@ -27,12 +32,10 @@ class PathTracer final : public Integrator {
       for (int first = 0; first < pixels; first += PathKernel::kBatch) {
         const int last = std::min(pixels, first + PathKernel::kBatch);
         kernel.clear();
-        for (int i = first; i < last; ++i) {
-          const auto pixel = static_cast<uint64_t>(pixelY(i)) * static_cast<uint64_t>(plan.settings.width) + static_cast<uint64_t>(pixelX(i));
-          kernel.start(pixelX(i), pixelY(i), sampler.itemKey(pixel));
-        }
+        for (int i = first; i < last; ++i)
+          kernel.start(pixelX(i), pixelY(i), pixelKey(sampler, plan, pixelX(i), pixelY(i)));
         kernel.run();
-        for (int i = first; i < last; ++i) storeSample(plan, pixelX(i), pixelY(i), kernel.sample(i - first), target);
+        for (int i = first; i < last; ++i) storeSample(request, pixelX(i), pixelY(i), kernel.sample(i - first), target);
       }
       return TileCounts{static_cast<uint64_t>(tile.width()) * static_cast<uint64_t>(tile.height()), kernel.rays, kernel.shadowRays};
     });

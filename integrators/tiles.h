@@ -41,14 +41,16 @@ bool forEachTile(const PassRequest& request, const Render& render) {
 }
 
 // Hands a path's result to the film: clamped only when asked to.
-inline void storeSample(const Plan& plan, int x, int y, const PathSample& sample, PassTarget& target) {
+inline void storeSample(const PassRequest& request, int x, int y, const PathSample& sample, PassTarget& target) {
+  const Plan& plan = request.plan;
   Spectrum radiance = sample.radiance;
   if (plan.settings.clamp > 0) {
     const float largest = maxComponent(radiance);
     if (largest > plan.settings.clamp) radiance *= plan.settings.clamp / largest;
   }
   const int px = x - plan.window.x0, py = y - plan.window.y0;
-  target.add(px, py, radiance);
+  if (!target.add(px, py, radiance) && request.statistics)
+    request.statistics->rejectedPixel = static_cast<int64_t>(y) * plan.settings.width + x;
   if (plan.features) target.features(px, py, sample.features);
 }
 

@@ -2,6 +2,7 @@
 // Materials for the BSDF tests: each lobe alone and the mixtures that occur.
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <vector>
 

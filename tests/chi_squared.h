@@ -104,8 +104,8 @@ class SphereCells {
     for (const Node& node : nodes_) {
       if (!node.leaf) continue;
       const Patch& p = node.patch;
-      // Large patches hold hardly a sample: look closely before believing that they are empty.
-      const int forced = p.area() > 0.02 ? 4 : p.area() > 1e-3 ? 2 : 0;
+      // Large patches with hardly a sample: look closely before believing that they are empty.
+      const int forced = !p.sparse ? 0 : p.area() > 0.02 ? 4 : p.area() > 1e-3 ? 2 : 0;
       result[p.cell] += refine(p, gauss(p, function), function, tolerance, forced, 8);
     }
     return result;
@@ -120,6 +120,7 @@ class SphereCells {
     bool above = true;
     Vec2 lo{0}, hi{1};
     size_t cell = kNone;
+    bool sparse = false;
     double area() const { return double(hi.x - lo.x) * double(hi.y - lo.y); }
   };
   struct Node {
@@ -134,6 +135,7 @@ class SphereCells {
     const auto count = static_cast<size_t>(last - first);
     if (cell == kNone && count < 2 * perCell_) cell = count_++;
     patch.cell = cell;
+    patch.sparse = count < kPerPatch / 3;
     const size_t index = nodes_.size();
     nodes_.emplace_back();
     nodes_[index].patch = patch;

@@ -12,7 +12,7 @@ int printLists() {
   fmt::print("integrators\n");
   for (const auto& i : makeIntegrators()) fmt::print("  {:<12} {}\n", i->name(), i->description());
   fmt::print("metrics\n");
-  for (const Metric& m : metrics()) fmt::print("  {:<12} {}\n", m.name, m.description);
+  for (const Metric& m : metricRegistry()) fmt::print("  {:<12} {}\n", m.name, m.description);
   return 0;
 }
 

@@ -108,6 +108,9 @@ int runRender(const RenderOptions& o) {
     if (report.clampedToHalf > 0)
       fmt::print(stderr, "warning: {}: {} headline values above 65504 were clamped to fit half floats: use --float\n", o.output, report.clampedToHalf);
     if (result.rejected > 0) fmt::print(stderr, "warning: {} non-finite or negative samples counted as 0\n", result.rejected);
+    if (result.firstRejected)
+      fmt::print(stderr, "one of them: braid replay {} --integrator {} --pass {} --pixel {},{} --size {} --seed {}\n", o.scene.file, result.firstRejected->integrator,
+                 result.firstRejected->pass, result.firstRejected->x, result.firstRejected->y, o.scene.size, o.samples.seed);
     fmt::print(stderr, "{} spp in {} ({:.2f} M paths/s, {:.1f} M rays/s), stopped by {}\n", result.estimates->estimates.front().passes,
                formatSeconds(result.seconds), static_cast<double>(result.paths) / result.seconds * 1e-6,
                static_cast<double>(result.rays + result.shadowRays) / result.seconds * 1e-6, toString(result.reason));

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,7 @@ struct Applies {
 // Counts of one pass, for reports. Sums over tiles; order does not matter.
 struct PassStatistics {
   std::atomic<uint64_t> paths{0}, rays{0}, shadowRays{0};
+  std::atomic<int64_t> rejectedPixel{-1};  // y · frame width + x of one rejected sample
 };
 
 struct PassRequest {
@@ -43,6 +45,12 @@ class Integrator {
   virtual Applies applies(const SceneTraits& traits) const = 0;
   // Renders pass `request.pass` of the plan's window into the target. Returns false when cancelled.
   virtual bool renderPass(const PassRequest& request, PassTarget& target) const = 0;
+
+  // For replaying camera paths: the random numbers of a pass and of a pixel in it; none where there are no camera paths by the path kernel.
+  virtual std::unique_ptr<PassSampler> pixelSampler(const Plan&, uint64_t /*pass*/) const { return nullptr; }
+  virtual uint64_t pixelKey(const PassSampler& sampler, const Plan& plan, int x, int y) const {
+    return sampler.itemKey(static_cast<uint64_t>(y) * static_cast<uint64_t>(plan.settings.width) + static_cast<uint64_t>(x));
+  }
 };
 
 }  // namespace braid

@@ -76,6 +76,9 @@ RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bo
           target.clear();
           abandoned = !plan_.integrators[i].integrator->renderPass({context_, plan_, pass, abandon, &statistics, nullptr}, target);
           if (abandoned) break;
+          const int64_t rejected = statistics.rejectedPixel.load();
+          if (rejected >= 0 && !result.firstRejected)
+            result.firstRejected = {plan_.integrators[i].integrator->name(), pass, static_cast<int>(rejected % settings.width), static_cast<int>(rejected / settings.width)};
           accumulators_[i].commit(pass, target);
           if (i == 0 && features_) features_->commit(pass, target);
         }

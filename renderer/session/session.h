@@ -5,6 +5,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,13 @@ struct RenderResult {
   double seconds = 0;                      // of the pass loop
   uint64_t paths = 0, rays = 0, shadowRays = 0;
   uint64_t rejected = 0;
+  // One rejected sample, if any, so that its path can be replayed.
+  struct RejectedSample {
+    std::string integrator;
+    uint64_t pass = 0;
+    int x = 0, y = 0;
+  };
+  std::optional<RejectedSample> firstRejected;
 };
 
 class Session {
