@@ -21,9 +21,7 @@ struct PathSample {
 
 // Light found at a vertex, not yet known to be visible.
 struct ShadowRay {
-  Vec3 origin, direction;
-  float tmax;
-  uint32_t salt;
+  RayQuery ray;
   Spectrum contribution;  // to the path's radiance if nothing lies between
   bool forFeatures;       // also the visibility feature
 };
@@ -46,7 +44,7 @@ class PathKernel {
       : context_(context), scene_(context.scene), plan_(plan), sampler_(sampler), record_(record), wantFeatures_(plan.features),
         filtered_(context.scene.accel().filtered()) {}
 
-  static constexpr int kBatch = 64;
+  static constexpr int kBatch = 256;
 
   // Starts a path through pixel (x, y) of the full frame with the random numbers of `key`. At most kBatch before a run().
   void start(int x, int y, uint64_t key);
@@ -59,8 +57,13 @@ class PathKernel {
   uint64_t rays = 0, shadowRays = 0;
 
  private:
+  void sortActive();
+  void traceActive();
+  void prefetchHits() const;
+  void shadeActive();
+  void traceShadows();
   // One step of a path from a traced ray; true when it goes on. At most one shadow ray is appended.
-  bool shade(PathState& path, bool hitSomething, const RayHit& query, PathSample& sample, ShadowRay& shadow, bool& hasShadow);
+  bool shade(PathState& path, const RayHit& query, PathSample& sample, ShadowRay& shadow, bool& hasShadow);
   void attenuate(PathState& path, float distance) const;
   float indexOutside(const PathState& path, const Hit& hit) const;
   void addEnvironment(const PathState& path, PathSample& sample) const;
@@ -82,8 +85,12 @@ class PathKernel {
   int count_ = 0;
   std::array<PathState, kBatch> path_;
   std::array<PathSample, kBatch> sample_;
-  std::array<RayHit, kBatch> query_;
-  std::array<bool, kBatch> found_;
+  std::array<RayHit, kBatch> hit_;   // in the order of active_
+  std::array<int, kBatch> active_;   // indices of the paths that go on
+  int activeCount_ = 0;
+  std::array<ShadowRay, kBatch> shadow_;
+  std::array<int, kBatch> shadowPath_;
+  int shadowCount_ = 0;
 };
 
 }  // namespace braid

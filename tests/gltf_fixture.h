@@ -25,7 +25,8 @@ struct Folder {
   fs::path path;
   Folder() {
     static int count = 0;
-    path = fs::temp_directory_path() / ("braid-test-gltf-" + std::to_string(::getpid()) + '-' + std::to_string(count++));
+    path =
+        fs::temp_directory_path() / ("braid-test-gltf-" + std::to_string(::getpid()) + '-' + std::to_string(count++));
     fs::create_directories(path);
   }
   ~Folder() { fs::remove_all(path); }
@@ -136,17 +137,32 @@ inline GltfFile quadFile() {
   const int uv = file.accessor<float>({0, 1, 1, 1, 1, 0, 0, 0}, "VEC2");
   const int indices = file.accessor<uint16_t>({0, 1, 2, 0, 2, 3}, "SCALAR");
   file.root["meshes"] = {
-      {{"primitives", {{{"attributes", {{"POSITION", position}, {"NORMAL", normal}, {"TEXCOORD_0", uv}}}, {"indices", indices}}}}}};
+      {{"primitives",
+        {{{"attributes", {{"POSITION", position}, {"NORMAL", normal}, {"TEXCOORD_0", uv}}}, {"indices", indices}}}}}};
   file.show();
   return file;
 }
 
 // A material of the file that primitive 0 uses.
-inline void giveMaterial(GltfFile& file, const Json& material) { file.primitive()["material"] = file.append("materials", material); }
+inline void giveMaterial(GltfFile& file, const Json& material) {
+  file.primitive()["material"] = file.append("materials", material);
+}
 
-// A valid 1x1 PNG image and a texture of it; returns the texture.
-int addTexture(GltfFile& file);
-std::string tinyPng();
+// One RGB pixel: 10, 200, 30.
+inline const std::vector<uint8_t>& tinyPng() {
+  static const std::vector<uint8_t> bytes{
+      0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49, 0x48, 0x44, 0x52, 0x00, 0x00,
+      0x00, 0x01, 0x00, 0x00, 0x00, 0x01, 0x08, 0x02, 0x00, 0x00, 0x00, 0x90, 0x77, 0x53, 0xde, 0x00, 0x00, 0x00,
+      0x0c, 0x49, 0x44, 0x41, 0x54, 0x78, 0xda, 0x63, 0xe0, 0x3a, 0x21, 0x07, 0x00, 0x01, 0xd0, 0x00, 0xf1, 0x1a,
+      0xa1, 0x42, 0x58, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82};
+  return bytes;
+}
+
+// A texture of that pixel, with an image of its own.
+inline int addTexture(GltfFile& file) {
+  const int image = file.append("images", {{"bufferView", file.view(tinyPng())}, {"mimeType", "image/png"}});
+  return file.append("textures", {{"source", image}});
+}
 
 inline bool hasWarning(const SceneData& scene, const std::string& part) {
   for (const std::string& w : scene.warnings) {
@@ -171,11 +187,11 @@ inline std::string errorOf(const GltfFile& file, const LoadOptions& options = {}
   return errorOf([&] { file.load(options); });
 }
 
-#define CHECK_ERROR(file, part)                    \
-  do {                                             \
-    const std::string text = test::errorOf(file);  \
-    INFO("error: ", text);                         \
-    CHECK(text.find(part) != std::string::npos);   \
+#define CHECK_ERROR(file, part)                   \
+  do {                                            \
+    const std::string text = test::errorOf(file); \
+    INFO("error: ", text);                        \
+    CHECK(text.find(part) != std::string::npos);  \
   } while (false)
 
 }  // namespace braid::test

@@ -29,7 +29,7 @@ std::string base64(const std::string& data) {
   return out;
 }
 
-const TriangleMesh& onlyMesh(const SceneData& scene) {
+TriangleMesh onlyMesh(const SceneData& scene) {
   REQUIRE(scene.meshes.size() == 1);
   return scene.meshes[0];
 }
@@ -46,7 +46,8 @@ GltfFile zigzag(int mode) {
 
 TEST_CASE("gltf: a GLB with one triangle that has no indices and no normals") {
   const SceneData scene = triangleFile().load();
-  const TriangleMesh& mesh = onlyMesh(scene);
+  REQUIRE(scene.meshes.size() == 1);
+  const TriangleMesh& mesh = scene.meshes[0];
   CHECK(mesh.positions.size() == 3);
   REQUIRE(mesh.triangles.size() == 1);
   CHECK(mesh.triangles[0] == glm::uvec3(0, 1, 2));
@@ -79,7 +80,8 @@ TEST_CASE("gltf: containers in unusual but legal shapes") {
   }
   SUBCASE("an empty binary chunk") {
     const std::string bare = R"({"asset":{"version":"2.0"}})";
-    const SceneData scene = loadGltf(folder.write("a.glb", glbOf(chunk(kJsonChunk, bare, ' ') + chunk(kBinaryChunk, "", '\0'))));
+    const SceneData scene =
+        loadGltf(folder.write("a.glb", glbOf(chunk(kJsonChunk, bare, ' ') + chunk(kBinaryChunk, "", '\0'))));
     CHECK(scene.meshes.empty());
     CHECK(hasWarning(scene, "no triangles"));
   }
@@ -146,8 +148,10 @@ TEST_CASE("gltf: indices of one, two and four bytes") {
 TEST_CASE("gltf: interleaved attributes") {
   GltfFile file = triangleFile();
   const int view = file.view<float>({0, 0, 0, 0, 0, 1, 2, 0, 0, 0, 0, 1, 0, 3, 0, 0, 0, 1}, 24);
-  const int position = file.append("accessors", {{"bufferView", view}, {"componentType", 5126}, {"type", "VEC3"}, {"count", 3}});
-  const int normal = file.append("accessors", {{"bufferView", view}, {"byteOffset", 12}, {"componentType", 5126}, {"type", "VEC3"}, {"count", 3}});
+  const int position =
+      file.append("accessors", {{"bufferView", view}, {"componentType", 5126}, {"type", "VEC3"}, {"count", 3}});
+  const int normal = file.append(
+      "accessors", {{"bufferView", view}, {"byteOffset", 12}, {"componentType", 5126}, {"type", "VEC3"}, {"count", 3}});
   file.primitive()["attributes"] = {{"POSITION", position}, {"NORMAL", normal}};
   const SceneData scene = file.load();
   CHECK(onlyMesh(scene).positions[2] == Vec3(0, 3, 0));
@@ -182,9 +186,13 @@ TEST_CASE("gltf: quantized positions, normals and texture coordinates") {
   Json& attributes = file.primitive()["attributes"];
   // Each vertex is padded to 8 bytes, as the alignment rules demand.
   const int view = file.view<int16_t>({0, 0, 0, 0, 32767, 0, 0, 0, 32767, -32768, 0, 0, 0, 32767, 0, 0}, 8);
-  attributes["POSITION"] = file.append("accessors", {{"bufferView", view}, {"componentType", 5122}, {"normalized", true}, {"type", "VEC3"}, {"count", 4}});
+  attributes["POSITION"] = file.append(
+      "accessors",
+      {{"bufferView", view}, {"componentType", 5122}, {"normalized", true}, {"type", "VEC3"}, {"count", 4}});
   const int normals = file.view<int8_t>({0, 0, 127, 0, 0, 0, 127, 0, 0, 0, 127, 0, 0, 0, 127, 0}, 4);
-  attributes["NORMAL"] = file.append("accessors", {{"bufferView", normals}, {"componentType", 5120}, {"normalized", true}, {"type", "VEC3"}, {"count", 4}});
+  attributes["NORMAL"] = file.append(
+      "accessors",
+      {{"bufferView", normals}, {"componentType", 5120}, {"normalized", true}, {"type", "VEC3"}, {"count", 4}});
   attributes["TEXCOORD_0"] = file.accessor<uint16_t>({0, 0, 2, 0, 2, 2, 0, 2}, "VEC2");
   LoadOptions options;
   options.keepAllAttributes = true;
@@ -231,7 +239,8 @@ TEST_CASE("gltf: vertex colours are clamped and may lack alpha") {
     CHECK(mesh.colors[2] == Vec4(0, 1, 1, 1));
   }
   SUBCASE("RGBA bytes") {
-    file.primitive()["attributes"]["COLOR_0"] = file.accessor<uint8_t>({255, 0, 51, 255, 0, 0, 0, 0, 0, 0, 0, 102}, "VEC4", true);
+    file.primitive()["attributes"]["COLOR_0"] =
+        file.accessor<uint8_t>({255, 0, 51, 255, 0, 0, 0, 0, 0, 0, 0, 102}, "VEC4", true);
     const TriangleMesh mesh = onlyMesh(file.load());
     CHECK(mesh.colors[0].z == doctest::Approx(0.2));
     CHECK(mesh.colors[2].w == doctest::Approx(0.4));
@@ -262,18 +271,21 @@ TEST_CASE("gltf: tangents are computed for normal maps and follow u, with w for 
     for (const Vec4& t : onlyMesh(file.load()).tangents) CHECK(t == Vec4(-1, 0, 0, -1));
   }
   SUBCASE("supplied tangents are kept") {
-    file.primitive()["attributes"]["TANGENT"] = file.accessor<float>({0, 2, 0, -1, 0, 1, 0, -1, 0, 1, 0, -1, 0, 1, 0, -1}, "VEC4");
+    file.primitive()["attributes"]["TANGENT"] =
+        file.accessor<float>({0, 2, 0, -1, 0, 1, 0, -1, 0, 1, 0, -1, 0, 1, 0, -1}, "VEC4");
     for (const Vec4& t : onlyMesh(file.load()).tangents) CHECK(t == Vec4(0, 1, 0, -1));
   }
   SUBCASE("unusable tangents are replaced") {
-    file.primitive()["attributes"]["TANGENT"] = file.accessor<float>({0, 0, 0, 1, 0, 1, 0, -1, 0, 1, 0, -1, 0, 1, 0, -1}, "VEC4");
+    file.primitive()["attributes"]["TANGENT"] =
+        file.accessor<float>({0, 0, 0, 1, 0, 1, 0, -1, 0, 1, 0, -1, 0, 1, 0, -1}, "VEC4");
     const SceneData scene = file.load();
     for (const Vec4& t : onlyMesh(scene).tangents) CHECK(t == Vec4(1, 0, 0, 1));
     CHECK(hasWarning(scene, "tangent is zero"));
   }
   SUBCASE("without normals the faces are flat and supplied tangents ignored") {
     file.primitive()["attributes"].erase("NORMAL");
-    file.primitive()["attributes"]["TANGENT"] = file.accessor<float>({0, 1, 0, -1, 0, 1, 0, -1, 0, 1, 0, -1, 0, 1, 0, -1}, "VEC4");
+    file.primitive()["attributes"]["TANGENT"] =
+        file.accessor<float>({0, 1, 0, -1, 0, 1, 0, -1, 0, 1, 0, -1, 0, 1, 0, -1}, "VEC4");
     const TriangleMesh mesh = onlyMesh(file.load());
     CHECK(mesh.positions.size() == 6);
     for (const Vec3& n : mesh.normals) CHECK(n == Vec3(0, 0, 1));
@@ -363,9 +375,10 @@ TEST_CASE("gltf: Draco meshes") {
   const int view = file.view(std::vector<char>(encoded.data(), encoded.data() + encoded.size()));
   const int position = file.append("accessors", {{"componentType", 5126}, {"type", "VEC3"}, {"count", 4}});
   const int indices = file.append("accessors", {{"componentType", 5123}, {"type", "SCALAR"}, {"count", 6}});
-  file.primitive() = {{"attributes", {{"POSITION", position}}},
-                      {"indices", indices},
-                      {"extensions", {{"KHR_draco_mesh_compression", {{"bufferView", view}, {"attributes", {{"POSITION", 0}}}}}}}};
+  file.primitive() = {
+      {"attributes", {{"POSITION", position}}},
+      {"indices", indices},
+      {"extensions", {{"KHR_draco_mesh_compression", {{"bufferView", view}, {"attributes", {{"POSITION", 0}}}}}}}};
   SUBCASE("decode") {
     const TriangleMesh decoded = onlyMesh(file.load());
     CHECK(decoded.triangles.size() == 2);
@@ -388,8 +401,10 @@ TEST_CASE("gltf: Draco meshes") {
 TEST_CASE("gltf: meshopt compression with a fallback buffer that has no data") {
   const std::vector<float> positions{0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
   const std::vector<uint32_t> indices{0, 1, 2, 0, 2, 3};
-  std::vector<uint8_t> packedVertices(meshopt_encodeVertexBufferBound(4, 12)), packedIndices(meshopt_encodeIndexBufferBound(6, 4));
-  packedVertices.resize(meshopt_encodeVertexBuffer(packedVertices.data(), packedVertices.size(), positions.data(), 4, 12));
+  std::vector<uint8_t> packedVertices(meshopt_encodeVertexBufferBound(4, 12)),
+      packedIndices(meshopt_encodeIndexBufferBound(6, 4));
+  packedVertices.resize(
+      meshopt_encodeVertexBuffer(packedVertices.data(), packedVertices.size(), positions.data(), 4, 12));
   meshopt_encodeIndexVersion(1);
   packedIndices.resize(meshopt_encodeIndexBuffer(packedIndices.data(), packedIndices.size(), indices.data(), 6));
 
@@ -403,13 +418,18 @@ TEST_CASE("gltf: meshopt compression with a fallback buffer that has no data") {
       extension["buffer"] = 0;
       extension["byteOffset"] = raw["byteOffset"];
       extension["byteLength"] = raw["byteLength"];
-      return file.append("bufferViews", {{"buffer", 1}, {"byteOffset", offset}, {"byteLength", length}, {"extensions", {{name, extension}}}});
+      return file.append(
+          "bufferViews",
+          {{"buffer", 1}, {"byteOffset", offset}, {"byteLength", length}, {"extensions", {{name, extension}}}});
     };
     const int vertexView = compress(v, {{"byteStride", 12}, {"count", 4}, {"mode", "ATTRIBUTES"}}, 0, 48);
     const int indexView = compress(i, {{"byteStride", 2}, {"count", 6}, {"mode", "TRIANGLES"}}, 48, 12);
-    file.root["buffers"] = {{{"byteLength", file.binary.size()}}, {{"byteLength", 60}, {"extensions", {{name, {{"fallback", true}}}}}}};
-    const int p = file.append("accessors", {{"bufferView", vertexView}, {"componentType", 5126}, {"type", "VEC3"}, {"count", 4}});
-    const int t = file.append("accessors", {{"bufferView", indexView}, {"componentType", 5123}, {"type", "SCALAR"}, {"count", 6}});
+    file.root["buffers"] = {{{"byteLength", file.binary.size()}},
+                            {{"byteLength", 60}, {"extensions", {{name, {{"fallback", true}}}}}}};
+    const int p =
+        file.append("accessors", {{"bufferView", vertexView}, {"componentType", 5126}, {"type", "VEC3"}, {"count", 4}});
+    const int t = file.append("accessors",
+                              {{"bufferView", indexView}, {"componentType", 5123}, {"type", "SCALAR"}, {"count", 6}});
     file.primitive() = {{"attributes", {{"POSITION", p}}}, {"indices", t}};
     const SceneData scene = file.load();
     CHECK(onlyMesh(scene).triangles.size() == 2);

@@ -49,7 +49,7 @@ T choose(const std::string& name, const char* option, const std::vector<std::pai
   std::string known;
   for (const auto& [key, value] : table) {
     if (key == name) return value;
-    known += (known.empty() ? "" : ", ") + key;
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", key);
   }
   throw Error(ExitCode::Usage, fmt::format("unknown {} '{}': known are {}", option, name, known));
 }

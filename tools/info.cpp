@@ -56,7 +56,7 @@ nlohmann::json describe(const Scene& scene) {
 void print(const nlohmann::json& j) {
   const auto list = [](const nlohmann::json& items) {
     std::string text;
-    for (const auto& i : items) text += (text.empty() ? "" : ", ") + (i.is_string() ? i.get<std::string>() : i["type"].get<std::string>());
+    for (const auto& i : items) text += fmt::format("{}{}", text.empty() ? "" : ", ", (i.is_string() ? i : i["type"]).get<std::string>());
     return text.empty() ? std::string("none") : text;
   };
   fmt::print("{}\n", j["file"].get<std::string>());

@@ -33,7 +33,7 @@ class PrintingObserver final : public PathObserver {
                hit.material->name, show(hit.position), hit.distance, hit.front ? "front" : "back", show(hit.frame.n));
   }
   void onLight(const ShadowRay& ray, bool visible) override {
-    fmt::print("   light sample along {}: {} {}\n", show(ray.direction), visible ? "adds" : "hidden, would add", show(ray.contribution));
+    fmt::print("   light sample along {}: {} {}\n", show(ray.ray.direction), visible ? "adds" : "hidden, would add", show(ray.contribution));
   }
 
  private:

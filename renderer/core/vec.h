@@ -43,6 +43,9 @@ inline float luminance(const Spectrum& s) { return 0.2126f * s.x + 0.7152f * s.y
 inline bool isBlack(const Spectrum& s) { return s.x == 0 && s.y == 0 && s.z == 0; }
 inline bool isFinite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
+// Makes a vector unit that is already so but for rounding: one Newton step, no square root.
+inline Vec3 renormalize(const Vec3& v) { return v * (1.5f - 0.5f * glm::dot(v, v)); }
+
 // An orthonormal basis whose z axis is the normal `n`.
 struct Frame {
   Vec3 s{1, 0, 0}, t{0, 1, 0}, n{0, 0, 1};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Embree 3 and 4 differ in how a query gets its context; the few lines that do are marked by BRAID_EMBREE4.
+// Embree 3 and 4 differ only in how a query gets its context: see the functions under BRAID_EMBREE4.
 #include "renderer/scene/accel.h"
 
 #include <atomic>
@@ -15,39 +15,73 @@ namespace braid {
 
 namespace {
 
-#ifdef BRAID_EMBREE4
-using QueryContext = RTCRayQueryContext;
-#else
-using QueryContext = RTCIntersectContext;
-#endif
-
-// Embree hands the context back to the filter, so what a filter needs of the ray rides behind it.
-struct Context {
-  QueryContext embree;
-  uint32_t salt;
-};
-
 bool countMemory(void* counter, ssize_t bytes, bool) {
   static_cast<std::atomic<int64_t>*>(counter)->fetch_add(bytes, std::memory_order_relaxed);
   return true;
 }
 
-RTCRay makeRay(const Vec3& o, const Vec3& d, float tmax) {
+// Lane i of a packet or, with N = 1, a single ray: Embree's structures of arrays have the same member names for every width.
+template <class Packet>
+void setLane(Packet& q, int i, const RayQuery& r) {
+  q.org_x[i] = r.origin.x;
+  q.org_y[i] = r.origin.y;
+  q.org_z[i] = r.origin.z;
+  q.tnear[i] = 0;
+  q.dir_x[i] = r.direction.x;
+  q.dir_y[i] = r.direction.y;
+  q.dir_z[i] = r.direction.z;
+  q.time[i] = 0;
+  q.tfar[i] = r.tmax;
+  q.mask[i] = ~0u;
+  q.id[i] = r.salt;  // handed back to the filter
+  q.flags[i] = 0;
+}
+
+RTCRay singleRay(const RayQuery& r) {
   RTCRay ray;
-  ray.org_x = o.x;
-  ray.org_y = o.y;
-  ray.org_z = o.z;
+  ray.org_x = r.origin.x;
+  ray.org_y = r.origin.y;
+  ray.org_z = r.origin.z;
   ray.tnear = 0;
-  ray.dir_x = d.x;
-  ray.dir_y = d.y;
-  ray.dir_z = d.z;
+  ray.dir_x = r.direction.x;
+  ray.dir_y = r.direction.y;
+  ray.dir_z = r.direction.z;
   ray.time = 0;
-  ray.tfar = tmax;
+  ray.tfar = r.tmax;
   ray.mask = ~0u;
-  ray.id = 0;
+  ray.id = r.salt;
   ray.flags = 0;
   return ray;
 }
+
+#ifdef BRAID_EMBREE4
+void embreeIntersect1(RTCScene scene, RTCRayHit& q) { rtcIntersect1(scene, &q, nullptr); }
+void embreeOccluded1(RTCScene scene, RTCRay& q) { rtcOccluded1(scene, &q, nullptr); }
+void embreeIntersect8(const int* valid, RTCScene scene, RTCRayHit8& q) { rtcIntersect8(valid, scene, &q, nullptr); }
+void embreeOccluded8(const int* valid, RTCScene scene, RTCRay8& q) { rtcOccluded8(valid, scene, &q, nullptr); }
+#else
+RTCIntersectContext plainContext() {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  return context;
+}
+void embreeIntersect1(RTCScene scene, RTCRayHit& q) {
+  RTCIntersectContext context = plainContext();
+  rtcIntersect1(scene, &context, &q);
+}
+void embreeOccluded1(RTCScene scene, RTCRay& q) {
+  RTCIntersectContext context = plainContext();
+  rtcOccluded1(scene, &context, &q);
+}
+void embreeIntersect8(const int* valid, RTCScene scene, RTCRayHit8& q) {
+  RTCIntersectContext context = plainContext();
+  rtcIntersect8(valid, scene, &context, &q);
+}
+void embreeOccluded8(const int* valid, RTCScene scene, RTCRay8& q) {
+  RTCIntersectContext context = plainContext();
+  rtcOccluded8(valid, scene, &context, &q);
+}
+#endif
 
 }  // namespace
 
@@ -75,11 +109,7 @@ void Accel::checkError(const char* doing) const {
 RTCScene Accel::newScene() const {
   RTCScene scene = rtcNewScene(device_);
   rtcSetSceneBuildQuality(scene, highQuality_ ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
-#ifdef BRAID_EMBREE4
-  rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | (filter_ ? RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS : 0)));
-#else
-  rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST));
-#endif
+  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);  // watertight
   return scene;
 }
 
@@ -109,6 +139,7 @@ void Accel::build(const AccelInput& input, const HitFilter* filter) {
   rtcSetDeviceMemoryMonitorFunction(device_, countMemory, &bytes);
   filter_ = filter;
   highQuality_ = input.highQuality;
+  packets_ = rtcGetDeviceProperty(device_, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0;
   worldMeshes_ = *input.worldMeshes;
   groups_ = *input.groups;
 
@@ -135,62 +166,73 @@ void Accel::build(const AccelInput& input, const HitFilter* filter) {
   bytes_ = static_cast<size_t>(bytes.load());
 }
 
-void Accel::resolve(const RTCHit& from, RayHit& to) const {
-  to.u = from.u;
-  to.v = from.v;
-  to.triangle = from.primID;
-  if (from.instID[0] == RTC_INVALID_GEOMETRY_ID) {
-    to.mesh = worldMeshes_[from.geomID];
-    to.instance = kNoInstance;
+void Accel::resolve(uint32_t geometry, uint32_t instance, RayHit& hit) const {
+  if (instance == RTC_INVALID_GEOMETRY_ID) {
+    hit.mesh = worldMeshes_[geometry];
+    hit.instance = kNoInstance;
   } else {
-    to.instance = from.instID[0] - static_cast<uint32_t>(worldMeshes_.size());
-    to.mesh = groups_[instanceGroup_[to.instance]].meshes[from.geomID];
+    hit.instance = instance - static_cast<uint32_t>(worldMeshes_.size());
+    hit.mesh = groups_[instanceGroup_[hit.instance]].meshes[geometry];
   }
 }
 
-bool Accel::intersect(const Vec3& origin, const Vec3& direction, float tmax, uint32_t salt, RayHit& hit) const {
-  Context context;
-  context.salt = salt;
-  RTCRayHit query;
-  query.ray = makeRay(origin, direction, tmax);
-  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-#ifdef BRAID_EMBREE4
-  rtcInitRayQueryContext(&context.embree);
-  RTCIntersectArguments arguments;
-  rtcInitIntersectArguments(&arguments);
-  arguments.context = &context.embree;
-  rtcIntersect1(scene_, &query, &arguments);
-#else
-  rtcInitIntersectContext(&context.embree);
-  rtcIntersect1(scene_, &context.embree, &query);
-#endif
-  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
-  hit.t = query.ray.tfar;
-  resolve(query.hit, hit);
-  return true;
+void Accel::intersect(const RayQuery* rays, int count, RayHit* hits) const {
+  if (!packets_ || count == 1) {
+    for (int i = 0; i < count; ++i) {
+      RTCRayHit query;
+      query.ray = singleRay(rays[i]);
+      query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+      embreeIntersect1(scene_, query);
+      const bool found = query.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+      hits[i].t = found ? query.ray.tfar : kInfinity;
+      if (!found) continue;
+      hits[i].u = query.hit.u;
+      hits[i].v = query.hit.v;
+      hits[i].triangle = query.hit.primID;
+      resolve(query.hit.geomID, query.hit.instID[0], hits[i]);
+    }
+    return;
+  }
+  alignas(32) int valid[kPacket];
+  RTCRayHit8 query;
+  for (int i = 0; i < kPacket; ++i) {
+    valid[i] = i < count ? -1 : 0;
+    setLane(query.ray, i, rays[i < count ? i : 0]);
+    query.hit.geomID[i] = query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+  embreeIntersect8(valid, scene_, query);
+  for (int i = 0; i < count; ++i) {
+    const bool found = query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+    hits[i].t = found ? query.ray.tfar[i] : kInfinity;
+    if (!found) continue;
+    hits[i].u = query.hit.u[i];
+    hits[i].v = query.hit.v[i];
+    hits[i].triangle = query.hit.primID[i];
+    resolve(query.hit.geomID[i], query.hit.instID[0][i], hits[i]);
+  }
 }
 
-bool Accel::occluded(const Vec3& origin, const Vec3& direction, float tmax, uint32_t salt) const {
-  Context context;
-  context.salt = salt;
-  RTCRay ray = makeRay(origin, direction, tmax);
-#ifdef BRAID_EMBREE4
-  rtcInitRayQueryContext(&context.embree);
-  RTCOccludedArguments arguments;
-  rtcInitOccludedArguments(&arguments);
-  arguments.context = &context.embree;
-  rtcOccluded1(scene_, &ray, &arguments);
-#else
-  rtcInitIntersectContext(&context.embree);
-  rtcOccluded1(scene_, &context.embree, &ray);
-#endif
-  return ray.tfar < 0;
+void Accel::occluded(const RayQuery* rays, int count, bool* results) const {
+  if (!packets_ || count == 1) {
+    for (int i = 0; i < count; ++i) {
+      RTCRay ray = singleRay(rays[i]);
+      embreeOccluded1(scene_, ray);
+      results[i] = ray.tfar < 0;
+    }
+    return;
+  }
+  alignas(32) int valid[kPacket];
+  RTCRay8 query;
+  for (int i = 0; i < kPacket; ++i) {
+    valid[i] = i < count ? -1 : 0;
+    setLane(query, i, rays[i < count ? i : 0]);
+  }
+  embreeOccluded8(valid, scene_, query);
+  for (int i = 0; i < count; ++i) results[i] = query.tfar[i] < 0;
 }
 
 void Accel::filterCallback(const RTCFilterFunctionNArguments* args) {
   const auto* data = static_cast<const FilterData*>(args->geometryUserPtr);
-  const auto* context = reinterpret_cast<const Context*>(args->context);
   for (unsigned i = 0; i < args->N; ++i) {
     if (args->valid[i] != -1) continue;
     const Vec3 direction(RTCRayN_dir_x(args->ray, args->N, i), RTCRayN_dir_y(args->ray, args->N, i), RTCRayN_dir_z(args->ray, args->N, i));
@@ -199,7 +241,7 @@ void Accel::filterCallback(const RTCFilterFunctionNArguments* args) {
     // normals transform by the inverse transpose.
     const bool backFace = glm::dot(direction, ng) > 0;
     if (data->filter->passThrough(data->mesh, RTCHitN_primID(args->hit, args->N, i), RTCHitN_u(args->hit, args->N, i),
-                                  RTCHitN_v(args->hit, args->N, i), backFace, context->salt))
+                                  RTCHitN_v(args->hit, args->N, i), backFace, RTCRayN_id(args->ray, args->N, i)))
       args->valid[i] = 0;
   }
 }

@@ -186,10 +186,9 @@ uint32_t JsonRef::index(size_t count, const char* what) const {
   const double value = value_->is_number() ? value_->get<double>() : -1;
   if (value >= 0 && value < static_cast<double>(count) && value == std::floor(value))
     return static_cast<uint32_t>(value);
-  problem("is " + brief(*value_) + ", but the file has " +
-          (count == 0 ? std::string("no ") + what
-                      : std::to_string(count) + ' ' + what + " (0 to " + std::to_string(count - 1) + ')') +
-          "; refer to one that exists");
+  const std::string last =
+      count == 0 ? "the file has no " + std::string(what) : what + (" end at " + std::to_string(count - 1));
+  problem("is " + brief(*value_) + ", but " + last + "; refer to one that exists");
   return kNone;
 }
 

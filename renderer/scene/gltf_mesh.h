@@ -21,7 +21,7 @@ struct MeshJob {
   std::shared_ptr<const std::vector<glm::mat4>> joints;  // joint to world times inverse bind; null: not skinned
 };
 
-// Names and values of attributes by name; from accessors or from a compressed mesh.
+// What a compressed mesh holds, with attributes by name.
 struct DracoMesh {
   struct Attribute {
     uint32_t components = 0;

@@ -118,7 +118,7 @@ void parseAnimation(Document& document, Animation& animation, const JsonRef& jso
     const JsonRef target = channel["target"].required("name the node and the property that move");
     const uint32_t index = channel["sampler"]
                                .required("write the index of a sampler")
-                               .index(samplers.size(), "samplers in this animation");
+                               .index(samplers.size(), "samplers of this animation");
     const uint32_t node = target["node"].index(document.nodes.size(), "nodes");
     const std::optional<AnimatedPath> path = parsePath(target["path"]);
     if (index == kNone || node == kNone || !path) continue;

@@ -143,7 +143,8 @@ void MaterialTable::loadTextures() {
   for (const uint32_t image : unique) {
     DecodedImage& item = decoded[image];
     if (!item.problem.empty()) document_.report.problem("/images/" + std::to_string(image), item.problem);
-    if (item.image && document_.images[image].view == kNone) document_.hash.add(item.encoded.data(), item.encoded.size());
+    if (item.image && document_.images[image].view == kNone)
+      document_.hash.add(item.encoded.data(), item.encoded.size());
     item.file = {};
   }
   scene_.textures.resize(textures_.size());

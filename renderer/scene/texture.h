@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images and textures: an image is decoded once and shared; a texture adds wrapping, filtering and the transfer function.
+// Images and textures: an image is decoded once and shared; a texture adds wrapping, filtering and the transfer
+// function.
 #pragma once
 
 #include <array>
@@ -18,7 +19,7 @@ struct Image {
   int width = 0, height = 0;
   int channels = 0;  // 1 grey, 2 grey+alpha, 3 RGB, 4 RGBA
   std::vector<uint8_t> bytes;
-  std::vector<float> floats;  // linear, unless the source held 16-bit integers:
+  std::vector<float> floats;   // linear, unless the source held 16-bit integers:
   bool integerFloats = false;  // floats are 16-bit integers scaled to [0,1], sRGB-encoded when the texture is a colour
   bool hasAlpha() const { return channels == 2 || channels == 4; }
 };
@@ -32,7 +33,8 @@ class Texture {
   // `srgb`: colour channels of 8-bit images are decoded from sRGB before filtering; alpha is always linear.
   Texture(std::shared_ptr<const Image> image, bool srgb, Wrap wrapU, Wrap wrapV, Filter filter);
 
-  // Linear RGBA at texture coordinates uv; bilinear unless the filter is nearest; grey is replicated, missing alpha is 1.
+  // Linear RGBA at texture coordinates uv; bilinear unless the filter is nearest; grey is replicated, missing alpha
+  // is 1.
   Vec4 sample(Vec2 uv) const;
 
   const Image& image() const { return *image_; }
@@ -55,8 +57,8 @@ class Texture {
   Filter filter_ = Filter::Linear;
 };
 
-// Decodes an encoded image (PNG, JPEG, WebP, HDR, EXR, …) held in memory by OpenImageIO. Colour profiles and gamma chunks are ignored, as
-// glTF demands. Throws Error(BadInput) with a one-line reason; refuses images over 2^28 pixels.
+// Decodes an encoded image (PNG, JPEG, WebP, HDR, EXR, …) held in memory by OpenImageIO. Colour profiles and gamma
+// chunks are ignored, as glTF demands. Throws Error(BadInput) with a one-line reason; refuses images over 2^28 pixels.
 std::shared_ptr<const Image> decodeImage(const uint8_t* data, size_t bytes, const std::string& name);
 
 // The same from a file.

@@ -16,7 +16,7 @@ namespace {
 
 void planIntegrators(const SceneTraits& traits, const Settings& settings, const std::vector<const Integrator*>& available, Plan& plan) {
   std::string known;
-  for (const Integrator* i : available) known += (known.empty() ? "" : ", ") + std::string(i->name());
+  for (const Integrator* i : available) known += fmt::format("{}{}", known.empty() ? "" : ", ", i->name());
   for (const std::string& name : settings.integrators) {
     bool found = false;
     for (const Integrator* i : available) {
@@ -55,10 +55,11 @@ void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
   part(kTraitInstances, "instance transforms", "meshes placed several times", "every mesh is placed once and lies in world space");
   part(kTraitEnvironmentImage, "environment sampling", "an environment image, sampled by luminance",
        t.has(kTraitEnvironment) ? "the environment is constant" : "no environment");
-  const uint64_t finite = t.emissiveTriangles + static_cast<uint64_t>(std::count_if(scene.lights().begin(), scene.lights().end(), [](const PunctualLight& l) {
+  const auto positional = static_cast<uint64_t>(std::count_if(scene.lights().begin(), scene.lights().end(), [](const PunctualLight& l) {
                             return l.kind != PunctualKind::Directional;
                           }));
-  const bool hierarchy = settings.lightStrategy == LightStrategy::Hierarchy || (settings.lightStrategy == LightStrategy::Automatic && finite > 4);
+  const uint64_t finite = t.emissiveTriangles + positional;
+  const bool hierarchy = settings.lightStrategy == LightStrategy::Hierarchy || (settings.lightStrategy == LightStrategy::Automatic && hierarchyPays(t.emissiveTriangles, positional));
   plan.lines.push_back({hierarchy, "light hierarchy",
                         hierarchy ? fmt::format("{} finite lights", finite)
                                   : settings.lightStrategy == LightStrategy::Power ? "lights are chosen by power on request"

@@ -53,6 +53,9 @@ class Bsdf {
     if (!diffuseOnly_) initLayers(p, transport);
   }
 
+  // A purely diffuse surface, without the detour over SurfaceParameters.
+  Bsdf(const Spectrum& albedo, const Vec3& wo) : wo_(aboveHorizon(wo)), diffuse_(albedo), diffuseOnly_(true) {}
+
   BsdfValue evaluate(const Vec3& wi, bool reverse = false) const {
     if (!diffuseOnly_) return evaluateLayers(wi, reverse);
     BsdfValue v;

@@ -11,10 +11,7 @@
 namespace braid {
 
 // Records the rays of a render, so that a benchmark can trace exactly the same ones again without shading.
-struct RecordedRay {
-  Vec3 origin, direction;
-  float tmax = 0;
-  uint32_t salt = 0;
+struct RecordedRay : RayQuery {
   bool shadow = false;
 };
 

@@ -2,7 +2,6 @@
 #include "renderer/transport/hit.h"
 
 #include <algorithm>
-#include <bit>
 
 namespace braid {
 
@@ -14,19 +13,20 @@ constexpr float gammaBound(float n) {
   return n * unit / (1 - n * unit);
 }
 
-// The next float from x in the direction of the sign of `towards` (x itself for 0): std::nextafter without the library call.
-float roundAway(float x, float towards) {
-  const auto bits = std::bit_cast<uint32_t>(x);
-  if (towards == 0 || !std::isfinite(x)) return x;
-  if (x == 0) return std::copysign(std::numeric_limits<float>::denorm_min(), towards);
-  return std::bit_cast<float>((towards > 0) == (x > 0) ? bits + 1 : bits - 1);
-}
-
 // Tangent-space normal of a map: x, y scaled, then unit.
 Vec3 mapNormal(const Vec4& texel, float scale) {
   const Vec3 n((2 * texel.x - 1) * scale, (2 * texel.y - 1) * scale, 2 * texel.z - 1);
   const float length = glm::length(n);
   return length > 0 && std::isfinite(length) ? n / length : Vec3(0, 0, 1);
+}
+
+// The cross product of a triangle's edges as a unit vector. That of a 10⁻⁸ m triangle underflows when squared, so small ones are scaled first;
+// `fallback` when it is zero.
+Vec3 unitNormal(const Vec3& n, const Vec3& fallback) {
+  const float length2 = glm::dot(n, n);
+  if (length2 > 1e-30f && length2 < 1e30f) return n * (1 / std::sqrt(length2));
+  const float largest = maxComponent(glm::abs(n));
+  return largest > 0 && largest < kInfinity ? glm::normalize(n / largest) : fallback;
 }
 
 Frame tangentFrame(const Vec3& normal, const Vec4& tangent) {
@@ -56,7 +56,10 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
 
   const Vec3 a = w * p0, b = u * p1, c = v * p2;
   hit.position = a + b + c;
-  hit.positionError = gammaBound(9) * (glm::abs(a) + glm::abs(b) + glm::abs(c));
+  // TRAP: the bound must not be taken coordinate by coordinate: on the plane z = 0 it would be 0, yet Embree's distance to that plane has the
+  // rounding errors of the triangle's other coordinates in it.
+  const Vec3 largest3 = glm::max(glm::max(glm::abs(p0), glm::abs(p1)), glm::abs(p2));
+  hit.positionError = Vec3(gammaBound(8) * maxComponent(largest3));
   Vec3 ng = glm::cross(p1 - p0, p2 - p0);
   Vec3 ns = mesh.normals.empty() ? ng : interpolate(mesh.normals, index, u, v);
   Vec4 tangent = mesh.tangents.empty() ? Vec4(0) : interpolate(mesh.tangents, index, u, v);
@@ -66,8 +69,8 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
     const Mat3 linear(instance.toWorld);
     const Mat3 absolute(glm::abs(linear[0]), glm::abs(linear[1]), glm::abs(linear[2]));
     const Vec3 translation(instance.toWorld[3]);
-    hit.positionError = (1 + gammaBound(3)) * (absolute * hit.positionError) +
-                        gammaBound(4) * (absolute * glm::abs(hit.position) + glm::abs(translation));
+    const Vec3 rounding = (1 + gammaBound(3)) * (absolute * hit.positionError) + gammaBound(4) * (absolute * glm::abs(hit.position) + glm::abs(translation));
+    hit.positionError = Vec3(maxComponent(rounding));
     hit.position = linear * hit.position + translation;
     // Normals go by the inverse transpose; that keeps the front side also in a mirrored instance.
     const Mat3 normalMatrix = glm::transpose(Mat3(instance.toObject));
@@ -76,9 +79,7 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
     tangent = Vec4(linear * Vec3(tangent), glm::determinant(linear) < 0 ? -tangent.w : tangent.w);
   }
 
-  // Triangles of 10⁻⁸ m have a cross product that underflows when squared, so scale before normalising.
-  const float largest = std::max({std::abs(ng.x), std::abs(ng.y), std::abs(ng.z)});
-  ng = largest > 0 ? glm::normalize(ng / largest) : hit.wo;
+  ng = unitNormal(ng, hit.wo);
   hit.front = glm::dot(hit.wo, ng) >= 0;
   if (mesh.normals.empty()) {
     ns = ng;
@@ -108,13 +109,10 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
 }
 
 Vec3 offsetOrigin(const Vec3& position, const Vec3& error, const Vec3& ng, const Vec3& direction) {
-  // Embree's own test has rounding errors of the size of the triangle's coordinates too, hence the factor.
-  const float d = 4 * glm::dot(glm::abs(ng), error);
+  const float d = 2 * glm::dot(glm::abs(ng), error);
   Vec3 offset = d * ng;
   if (glm::dot(direction, ng) < 0) offset = -offset;
-  Vec3 origin = position + offset;
-  for (int i = 0; i < 3; ++i) origin[i] = roundAway(origin[i], offset[i]);
-  return origin;
+  return position + offset;
 }
 
 uint32_t materialLobes(const Material& m) {

@@ -71,12 +71,17 @@ float spotFalloff(const PunctualLight& light, float cosAngle) {
   return sqr(std::clamp((cosAngle - outer) * scale, 0.0f, 1.0f));
 }
 
+bool hierarchyPays(size_t emissiveTriangles, size_t positionalLights) {
+  const size_t finite = emissiveTriangles + positionalLights;
+  return finite > 4 || (finite > 1 && positionalLights > 0);
+}
+
 LightSampler::LightSampler(const Scene& scene, LightStrategy strategy) : scene_(scene) {
   const std::vector<EmissiveTriangle>& emitters = scene.emitters();
   for (uint32_t i = 0; i < scene.lights().size(); ++i)
     (scene.lights()[i].kind == PunctualKind::Directional ? directional_ : positional_).push_back(i);
   finite_ = emitters.size() + positional_.size();
-  hierarchy_ = strategy == LightStrategy::Hierarchy || (strategy == LightStrategy::Automatic && finite_ > 4);
+  hierarchy_ = strategy == LightStrategy::Hierarchy || (strategy == LightStrategy::Automatic && hierarchyPays(emitters.size(), positional_.size()));
 
   double finitePower = 0;
   std::vector<double> powers;

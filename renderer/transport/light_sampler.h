@@ -22,9 +22,13 @@ struct LightSample {
 // How finite lights are chosen.
 enum class LightStrategy { Automatic, Power, Hierarchy };
 
+// Whether a light hierarchy is worth its cost: not for up to 4 emissive triangles (one or two area lights), where choosing by power is as good; yes as
+// soon as distances and cones of several lights differ from point to point.
+bool hierarchyPays(size_t emissiveTriangles, size_t positionalLights);
+
 class LightSampler {
  public:
-  // Automatic: by power for up to 4 finite lights, where a hierarchy cannot pay, else by the hierarchy.
+  // Automatic: see hierarchyPays().
   LightSampler(const Scene& scene, LightStrategy strategy);
 
   // Samples a light for the point p with shading normal n; `twoSided`: the surface transmits. False: no light can contribute.
