@@ -123,11 +123,17 @@ bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Bsdf& 
   shadow.contribution = path.throughput * value.f * light.radiance * (weight / light.pdfW);
   shadow.ray.origin = offsetOrigin(hit, light.wi);
   shadow.ray.direction = light.wi;
-  shadow.ray.tmax = light.distance < kInfinity ? light.distance * kShadowLength : kInfinity;
+  shadow.ray.tmax = kInfinity;
+  if (light.distance < kInfinity) {
+    // TRAP: aimed anew from the moved origin. On a large triangle the move is longer than the margin before a near light: the light would hide itself.
+    shadow.ray.direction = hit.position + light.wi * light.distance - shadow.ray.origin;
+    shadow.ray.tmax = kShadowLength;
+  }
   shadow.ray.salt = mix32(path.salt ^ 0x51ed270bu);
-  if (!path.media.empty() || hit.material->hasVolume()) {
+  const bool volume = context_.summaryOf(hit).volume;
+  if (!path.media.empty() || volume) {
     MediaStack media = path.media;
-    if (!reflects && hit.material->hasVolume()) hit.front ? media.enter(hit.mesh->material) : media.leave(hit.mesh->material);
+    if (!reflects && volume) hit.front ? media.enter(hit.mesh->material) : media.leave(hit.mesh->material);
     const int64_t medium = media.ruling(scene_.materials());
     if (medium >= 0) shadow.contribution *= volumeTransmittance(scene_.materials()[static_cast<size_t>(medium)], light.distance);
   }
@@ -188,48 +194,31 @@ void PathKernel::start(int x, int y, uint64_t key) {
 
 void PathKernel::run() {
   activeCount_ = count_;
-  for (int i = 0; i < count_; ++i) active_[static_cast<size_t>(i)] = i;
+  for (int i = 0; i < count_; ++i) {
+    active_[static_cast<size_t>(i)] = i;
+    queueRay(i, path_[static_cast<size_t>(i)]);
+  }
+  // A small scene's vertices are in the cache anyway.
+  const bool prefetch = scene_.traits().triangles > 16384;
   while (activeCount_ > 0) {
     traceActive();
-    prefetchHits();
+    if (prefetch) prefetchHits();
     shadeActive();
     traceShadows();
   }
 }
 
-// Orders the active paths by the octant of their direction, so that the rays of a packet go the same way.
-void PathKernel::sortActive() {
-  std::array<int, 9> begin{};
-  std::array<uint8_t, kBatch> octant;
-  for (int a = 0; a < activeCount_; ++a) {
-    const Vec3& d = path_[static_cast<size_t>(active_[static_cast<size_t>(a)])].direction;
-    const auto o = static_cast<uint8_t>((d.x < 0 ? 1 : 0) | (d.y < 0 ? 2 : 0) | (d.z < 0 ? 4 : 0));
-    octant[static_cast<size_t>(a)] = o;
-    ++begin[o + 1u];
-  }
-  for (size_t o = 1; o < 9; ++o) begin[o] += begin[o - 1];
-  const std::array<int, kBatch> before = active_;
-  for (int a = 0; a < activeCount_; ++a) {
-    const auto i = static_cast<size_t>(a);
-    active_[static_cast<size_t>(begin[octant[i]]++)] = before[i];
-  }
+void PathKernel::queueRay(int slot, PathState& path) {
+  if (filtered_) path.salt = sampler_.salt(path.key, static_cast<uint32_t>(path.segments + path.nullCrossings));
+  rays_.set(slot, {path.origin, path.direction, kInfinity, path.salt});
+  if (observer_) observer_->onRay(path);
 }
 
 void PathKernel::traceActive() {
-  //sortActive();
-  std::array<RayQuery, Accel::kPacket> packet;
-  for (int first = 0; first < activeCount_; first += Accel::kPacket) {
-    const int count = std::min(Accel::kPacket, activeCount_ - first);
-    for (int k = 0; k < count; ++k) {
-      PathState& path = path_[static_cast<size_t>(active_[static_cast<size_t>(first + k)])];
-      if (filtered_) path.salt = sampler_.salt(path.key, static_cast<uint32_t>(path.segments + path.nullCrossings));
-      packet[static_cast<size_t>(k)] = {path.origin, path.direction, kInfinity, path.salt};
-      if (record_) record_->push_back({packet[static_cast<size_t>(k)], false});
-      if (observer_) observer_->onRay(path);
-    }
-    scene_.accel().intersect(packet.data(), count, &hit_[static_cast<size_t>(first)]);
-  }
-  rays += static_cast<uint64_t>(activeCount_);
+  if (record_)
+    for (int a = 0; a < activeCount_; ++a) record_->push_back({rays_.get(a), false});
+  scene_.accel().intersect(rays_, activeCount_, hit_.data());
+  rayCount += static_cast<uint64_t>(activeCount_);
 }
 
 // Fetches the vertices of all hits while nothing waits for them (1.2x on a million triangles).
@@ -258,32 +247,31 @@ void PathKernel::shadeActive() {
     const auto i = static_cast<size_t>(p);
     bool hasShadow = false;
     const bool goesOn = shade(path_[i], hit_[static_cast<size_t>(a)], sample_[i], shadow_[static_cast<size_t>(shadowCount_)], hasShadow);
-    if (hasShadow) shadowPath_[static_cast<size_t>(shadowCount_++)] = p;
-    if (goesOn) active_[static_cast<size_t>(alive++)] = p;
+    if (hasShadow) {
+      shadowRays_.set(shadowCount_, shadow_[static_cast<size_t>(shadowCount_)].ray);
+      shadowPath_[static_cast<size_t>(shadowCount_++)] = p;
+    }
+    if (!goesOn) continue;
+    active_[static_cast<size_t>(alive)] = p;
+    queueRay(alive++, path_[i]);
   }
   activeCount_ = alive;
 }
 
 void PathKernel::traceShadows() {
-  std::array<RayQuery, Accel::kPacket> packet;
-  std::array<bool, Accel::kPacket> hidden;
-  for (int first = 0; first < shadowCount_; first += Accel::kPacket) {
-    const int count = std::min(Accel::kPacket, shadowCount_ - first);
-    for (int k = 0; k < count; ++k) {
-      packet[static_cast<size_t>(k)] = shadow_[static_cast<size_t>(first + k)].ray;
-      if (record_) record_->push_back({packet[static_cast<size_t>(k)], true});
-    }
-    scene_.accel().occluded(packet.data(), count, hidden.data());
-    for (int k = 0; k < count; ++k) {
-      const ShadowRay& shadow = shadow_[static_cast<size_t>(first + k)];
-      if (observer_) observer_->onLight(shadow, !hidden[static_cast<size_t>(k)]);
-      if (hidden[static_cast<size_t>(k)]) continue;
-      PathSample& sample = sample_[static_cast<size_t>(shadowPath_[static_cast<size_t>(first + k)])];
-      sample.radiance += shadow.contribution;
-      if (shadow.forFeatures) sample.features.visibility = 1;
-    }
+  if (record_)
+    for (int k = 0; k < shadowCount_; ++k) record_->push_back({shadowRays_.get(k), true});
+  std::array<bool, kBatch> hidden;
+  scene_.accel().occluded(shadowRays_, shadowCount_, hidden.data());
+  for (int k = 0; k < shadowCount_; ++k) {
+    const ShadowRay& shadow = shadow_[static_cast<size_t>(k)];
+    if (observer_) observer_->onLight(shadow, !hidden[static_cast<size_t>(k)]);
+    if (hidden[static_cast<size_t>(k)]) continue;
+    PathSample& sample = sample_[static_cast<size_t>(shadowPath_[static_cast<size_t>(k)])];
+    sample.radiance += shadow.contribution;
+    if (shadow.forFeatures) sample.features.visibility = 1;
   }
-  shadowRays += static_cast<uint64_t>(shadowCount_);
+  shadowRayCount += static_cast<uint64_t>(shadowCount_);
 }
 
 bool PathKernel::shade(PathState& path, const RayHit& query, PathSample& sample, ShadowRay& shadow, bool& hasShadow) {
@@ -295,15 +283,17 @@ bool PathKernel::shade(PathState& path, const RayHit& query, PathSample& sample,
   Hit hit;
   makeHit(scene_, query, path.direction, hit);
   if (observer_) observer_->onHit(hit);
-  const Material& material = *hit.material;
   attenuate(path, hit.distance);
-  if (material.hasVolume() && crossNullInterface(path, hit)) return path.nullCrossings < kMaxNullCrossings;
-  if (material.unlit) {
-    addUnlit(path, hit, sample);
-    return false;
+  const MaterialSummary& material = context_.summaryOf(hit);
+  if (material.special()) {
+    if (material.volume && crossNullInterface(path, hit)) return path.nullCrossings < kMaxNullCrossings;
+    if (material.unlit) {
+      addUnlit(path, hit, sample);
+      return false;
+    }
+    if (material.emissive) addEmission(path, hit, sample);
   }
-  if (material.emissive()) addEmission(path, hit, sample);
-  const uint32_t lobes = context_.lobesOf(hit);
+  const uint32_t lobes = material.lobes;
   const Vec3 wo = hit.frame.toLocal(hit.wo);
   const Bsdf bsdf = lobes == kLobeDiffuse ? Bsdf(baseColorAt(scene_, hit), wo) : Bsdf(surfaceAt(scene_, hit, lobes, indexOutside(path, hit)), wo);
   const bool firstNonSpecular = wantFeatures_ && !path.featuresDone;

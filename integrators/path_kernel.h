@@ -44,8 +44,6 @@ class PathKernel {
       : context_(context), scene_(context.scene), plan_(plan), sampler_(sampler), record_(record), wantFeatures_(plan.features),
         filtered_(context.scene.accel().filtered()) {}
 
-  static constexpr int kBatch = 256;
-
   // Starts a path through pixel (x, y) of the full frame with the random numbers of `key`. At most kBatch before a run().
   void start(int x, int y, uint64_t key);
   // Follows all started paths to their ends; their samples are then in the order of start().
@@ -54,10 +52,10 @@ class PathKernel {
   void clear() { count_ = 0; }
   void observe(PathObserver* observer) { observer_ = observer; }
 
-  uint64_t rays = 0, shadowRays = 0;
+  uint64_t rayCount = 0, shadowRayCount = 0;
 
  private:
-  void sortActive();
+  void queueRay(int slot, PathState& path);
   void traceActive();
   void prefetchHits() const;
   void shadeActive();
@@ -83,11 +81,13 @@ class PathKernel {
   bool wantFeatures_, filtered_;
 
   int count_ = 0;
-  std::array<PathState, kBatch> path_;
-  std::array<PathSample, kBatch> sample_;
-  std::array<RayHit, kBatch> hit_;   // in the order of active_
+  std::array<PathState, kBatch> path_{};
+  std::array<PathSample, kBatch> sample_{};
+  RayBatch rays_;                    // in the order of active_, like their hits
+  std::array<RayHit, kBatch> hit_;
   std::array<int, kBatch> active_;   // indices of the paths that go on
   int activeCount_ = 0;
+  ShadowBatch shadowRays_;
   std::array<ShadowRay, kBatch> shadow_;
   std::array<int, kBatch> shadowPath_;
   int shadowCount_ = 0;

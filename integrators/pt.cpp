@@ -29,15 +29,15 @@ class PathTracer final : public Integrator {
       const int pixels = tile.width() * tile.height();
       const auto pixelX = [&](int i) { return tile.x0 + i % tile.width(); };
       const auto pixelY = [&](int i) { return tile.y0 + i / tile.width(); };
-      for (int first = 0; first < pixels; first += PathKernel::kBatch) {
-        const int last = std::min(pixels, first + PathKernel::kBatch);
+      for (int first = 0; first < pixels; first += kBatch) {
+        const int last = std::min(pixels, first + kBatch);
         kernel.clear();
         for (int i = first; i < last; ++i)
           kernel.start(pixelX(i), pixelY(i), pixelKey(sampler, plan, pixelX(i), pixelY(i)));
         kernel.run();
         for (int i = first; i < last; ++i) storeSample(request, pixelX(i), pixelY(i), kernel.sample(i - first), target);
       }
-      return TileCounts{static_cast<uint64_t>(tile.width()) * static_cast<uint64_t>(tile.height()), kernel.rays, kernel.shadowRays};
+      return TileCounts{static_cast<uint64_t>(tile.width()) * static_cast<uint64_t>(tile.height()), kernel.rayCount, kernel.shadowRayCount};
     });
   }
 };

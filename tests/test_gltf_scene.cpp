@@ -276,7 +276,7 @@ TEST_CASE("gltf: a dark file gets a grey dome, unless told otherwise") {
   const SceneData scene = file.load();
   CHECK(scene.defaultLight);
   REQUIRE(scene.environment);
-  CHECK(scene.environment->radiance == Spectrum(1));
+  CHECK(scene.environment->radiance == Spectrum(0.5f));
   LoadOptions options;
   options.defaultLight = false;
   CHECK_FALSE(file.load(options).environment);

@@ -11,6 +11,7 @@
 #include <tbb/task_arena.h>
 
 #include "integrators/registry.h"
+#include "renderer/core/hash.h"
 #include "tools/builtin_scenes.h"
 #include "tools/cli.h"
 #include "version.h"
@@ -66,6 +67,26 @@ void traceRaw(RTCScene scene, const RecordedRay& r) {
   else rtcIntersect1(scene, &context, &query);
 }
 
+// Traces the recorded rays as the renderer does: in packets of neighbours of one kind.
+void traceLikeRenderer(const Accel& accel, const std::vector<RecordedRay>& rays) {
+  RayBatch batch;
+  ShadowBatch shadows;
+  std::array<RayHit, kBatch> hits;
+  std::array<bool, kBatch> hidden;
+  for (size_t i = 0; i < rays.size();) {
+    const bool shadow = rays[i].shadow;
+    int count = 0;
+    for (; count < kBatch && i < rays.size() && rays[i].shadow == shadow; ++count, ++i) shadow ? shadows.set(count, rays[i]) : batch.set(count, rays[i]);
+    if (shadow) accel.occluded(shadows, count, hidden.data());
+    else accel.intersect(batch, count, hits.data());
+  }
+}
+
+// A fixed random order: neighbours in memory have nothing in common.
+void shuffle(std::vector<RecordedRay>& rays, uint64_t seed) {
+  for (size_t i = rays.size(); i > 1; --i) std::swap(rays[i - 1], rays[mix64(seed + i) % i]);
+}
+
 struct SceneSource {
   std::string name;
   std::function<SceneData()> load;
@@ -84,7 +105,7 @@ nlohmann::json benchScene(const SceneSource& source, const BenchOptions& o, cons
   const TransportContext context(scene, settings.lightStrategy);
   const Integrator& integrator = *plan.integrators.front().integrator;
 
-  std::vector<double> renderRates, rawRates, ratios, pathRates, rawIncoherent;
+  std::vector<double> renderRates, rawRates, ratios, pathRates, shares, incoherentRates, incoherentRatios;
   uint64_t rayCount = 0;
   tbb::task_arena arena(settings.threads > 0 ? settings.threads : tbb::task_arena::automatic);
   arena.execute([&] {
@@ -92,6 +113,8 @@ nlohmann::json benchScene(const SceneSource& source, const BenchOptions& o, cons
     Accumulator film(plan.window.width(), plan.window.height(), plan.buckets);
     std::vector<std::vector<RecordedRay>> recorded;
     integrator.renderPass({context, plan, 0, nullptr, nullptr, &recorded}, target);
+    std::vector<std::vector<RecordedRay>> shuffled = recorded;
+    for (size_t i = 0; i < shuffled.size(); ++i) shuffle(shuffled[i], i);
     uint64_t recordedRays = 0;
     for (const auto& tile : recorded) recordedRays += tile.size();
     const uint64_t passes = std::max<uint64_t>(1, settings.spp / static_cast<uint64_t>(o.repeats));
@@ -106,16 +129,24 @@ nlohmann::json benchScene(const SceneSource& source, const BenchOptions& o, cons
       }
       const double renderSeconds = now() - start;
       rayCount = (statistics.rays + statistics.shadowRays) / passes;
-      const double rawStart = now();
-      tbb::parallel_for(size_t(0), recorded.size(), [&](size_t i) {
-        for (const RecordedRay& r : recorded[i]) traceRaw(scene.accel().handle(), r);
-      });
-      const double rawSeconds = now() - rawStart;
+      const auto timeRaw = [&](const std::vector<std::vector<RecordedRay>>& tiles) {
+        const double rawStart = now();
+        tbb::parallel_for(size_t(0), tiles.size(), [&](size_t i) {
+          for (const RecordedRay& r : tiles[i]) traceRaw(scene.accel().handle(), r);
+        });
+        return now() - rawStart;
+      };
+      const double rawSeconds = timeRaw(recorded), incoherentSeconds = timeRaw(shuffled);
+      const double embreeStart = now();
+      tbb::parallel_for(size_t(0), recorded.size(), [&](size_t i) { traceLikeRenderer(scene.accel(), recorded[i]); });
+      shares.push_back((now() - embreeStart) * static_cast<double>(passes) / renderSeconds);
       const double renderRate = static_cast<double>(statistics.rays + statistics.shadowRays) / renderSeconds;
       const double rawRate = static_cast<double>(recordedRays) / rawSeconds;
       renderRates.push_back(renderRate);
       rawRates.push_back(rawRate);
       ratios.push_back(renderRate / rawRate);
+      incoherentRates.push_back(static_cast<double>(recordedRays) / incoherentSeconds);
+      incoherentRatios.push_back(renderRate / incoherentRates.back());
       pathRates.push_back(static_cast<double>(statistics.paths) / renderSeconds);
     }
   });
@@ -128,7 +159,9 @@ nlohmann::json benchScene(const SceneSource& source, const BenchOptions& o, cons
           {"raysPerSecond", median(renderRates)},
           {"rawRaysPerSecond", median(rawRates)},
           {"ratio", ratio},
-          {"embreeShare", ratio},
+          {"rawIncoherentRaysPerSecond", median(incoherentRates)},
+          {"incoherentRatio", median(incoherentRatios)},
+          {"embreeShare", median(shares)},
           {"raysPerPath", static_cast<double>(rayCount) / pixels},
           {"loadSeconds", loadSeconds},
           {"hierarchySeconds", scene.buildTimes().hierarchy},
@@ -162,9 +195,11 @@ int runBench(const BenchOptions& o) {
     all.push_back(r);
     if (o.json) continue;
     fmt::print("{}: {} triangles, {:.2f} rays a path\n", source.name, r["triangles"].dump(), r["raysPerPath"].get<double>());
-    fmt::print("  {:.2f} M paths/s, {:.2f} M rays/s; the same rays by Embree alone {:.2f} M rays/s: ratio {:.3f} (share of the time inside Embree)\n",
-               r["pathsPerSecond"].get<double>() * 1e-6, r["raysPerSecond"].get<double>() * 1e-6, r["rawRaysPerSecond"].get<double>() * 1e-6,
-               r["ratio"].get<double>());
+    fmt::print("  {:.2f} M paths/s, {:.2f} M rays/s, {:.0f} % of the time inside Embree\n", r["pathsPerSecond"].get<double>() * 1e-6,
+               r["raysPerSecond"].get<double>() * 1e-6, 100 * r["embreeShare"].get<double>());
+    fmt::print("  the same rays one by one by Embree alone: {:.2f} M rays/s in the order of the render (ratio {:.3f}), {:.2f} M rays/s in random order (ratio {:.3f})\n",
+               r["rawRaysPerSecond"].get<double>() * 1e-6, r["ratio"].get<double>(), r["rawIncoherentRaysPerSecond"].get<double>() * 1e-6,
+               r["incoherentRatio"].get<double>());
     fmt::print("  load {:.3f} s, hierarchies {:.3f} s, {:.1f} bytes a triangle in hierarchies, {:.1f} in all; film {} bytes a pixel; peak {:.0f} MiB\n",
                r["loadSeconds"].get<double>(), r["hierarchySeconds"].get<double>(), r["hierarchyBytesPerTriangle"].get<double>(),
                r["sceneBytesPerTriangle"].get<double>(), r["filmBytesPerPixel"].dump(), r["peakMemoryBytes"].get<double>() / 1048576.0);

@@ -2,7 +2,9 @@
 // Vectors, colours and shading frames. Positions in metres; radiance in W·sr⁻¹·m⁻², linear Rec. 709 primaries.
 #pragma once
 
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include <glm/glm.hpp>
@@ -31,6 +33,12 @@ inline constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;
 template <class T>
 constexpr T sqr(T x) {
   return x * x;
+}
+
+// c ? a : b without a branch: for choices that random numbers make, which no predictor learns.
+inline float select(bool c, float a, float b) {
+  const uint32_t mask = 0u - static_cast<uint32_t>(c);
+  return std::bit_cast<float>((std::bit_cast<uint32_t>(a) & mask) | (std::bit_cast<uint32_t>(b) & ~mask));
 }
 
 // sqrt that treats small negative rounding errors as zero.

@@ -23,12 +23,6 @@ constexpr float kHalfMax = 65504;
 // Rows written at once: several ZIP blocks of 16 rows, so that OpenEXR compresses them in parallel.
 constexpr int kRowsPerWrite = 64;
 
-struct Channel {
-  std::string name;
-  const Plane<float>* plane;
-  bool half = false;
-};
-
 using Names = std::array<const char*, 3>;
 constexpr Names kColour = {"R", "G", "B"};
 constexpr Names kVector = {"X", "Y", "Z"};
@@ -55,14 +49,14 @@ class ChannelList {
   }
   void add(const std::string& layer, const char* name, const Plane<float>& plane) { add(layer + "." + name, plane); }
 
-  const std::vector<Channel>& list() const { return list_; }
+  std::vector<NamedPlane> list() const { return list_; }
 
  private:
   void check(const Plane<float>& plane) const { BRAID_ASSERT(plane.width == width_ && plane.height == height_); }
 
   int width_, height_;
   std::string prefix_;
-  std::vector<Channel> list_;
+  std::vector<NamedPlane> list_;
 };
 
 template <class P, class N>
@@ -83,8 +77,10 @@ void addEstimate(ChannelList& channels, const Estimate& e, bool quarters) {
   for (size_t q = 0; q < e.quarter.size(); ++q) channels.add(e.name + ".q" + std::to_string(q), kColour, e.quarter[q]);
 }
 
-ChannelList collectChannels(const Estimates& estimates, const Rgb<float>& headline, const Plane<float>* alpha,
-                            const ExrOptions& options) {
+}  // namespace
+
+std::vector<NamedPlane> namedPlanes(const Estimates& estimates, const Rgb<float>& headline, const Plane<float>* alpha,
+                                    const ExrOptions& options) {
   ChannelList channels(headline.width(), headline.height(), options.layerPrefix);
   const bool half = !options.floatHeadline;
   for (size_t c = 0; c < 3; ++c) channels.addHeadline(kColour[c], headline[c], half);
@@ -97,12 +93,14 @@ ChannelList collectChannels(const Estimates& estimates, const Rgb<float>& headli
     addFeature(channels, "Depth", "Z", f.depth, all);
     addFeature(channels, "Visibility", "V", f.visibility, all);
   }
-  if (!all) return channels;
+  if (!all) return channels.list();
   for (const Estimate& e : estimates.estimates) addEstimate(channels, e, options.quarters);
   for (const ExrLayer& layer : options.layers)
     if (layer.planes) channels.add(layer.name, kColour, *layer.planes);
-  return channels;
+  return channels.list();
 }
+
+namespace {
 
 void addAttribute(OIIO::ImageSpec& spec, const Attribute& a) {
   using OIIO::TypeDesc;
@@ -131,12 +129,12 @@ void addAttribute(OIIO::ImageSpec& spec, const Attribute& a) {
   }
 }
 
-OIIO::ImageSpec makeSpec(const Estimates& estimates, const std::vector<Channel>& channels) {
+OIIO::ImageSpec makeSpec(const Estimates& estimates, const std::vector<NamedPlane>& channels) {
   using OIIO::TypeDesc;
   const int width = channels[0].plane->width, height = channels[0].plane->height;
   OIIO::ImageSpec spec(width, height, static_cast<int>(channels.size()), TypeDesc::FLOAT);
   spec.channelnames.clear();
-  for (const Channel& c : channels) {
+  for (const NamedPlane& c : channels) {
     spec.channelnames.push_back(c.name);
     spec.channelformats.push_back(c.half ? TypeDesc::HALF : TypeDesc::FLOAT);
     if (c.name == "A") spec.alpha_channel = static_cast<int>(spec.channelnames.size()) - 1;
@@ -163,7 +161,7 @@ OIIO::ImageSpec makeSpec(const Estimates& estimates, const std::vector<Channel>&
 
 // Copies rows [begin, end) of all planes, interleaved; returns how many values had to be clamped to the range of half
 // floats.
-uint64_t interleave(const std::vector<Channel>& channels, int begin, int end, std::vector<float>& out) {
+uint64_t interleave(const std::vector<NamedPlane>& channels, int begin, int end, std::vector<float>& out) {
   std::atomic<uint64_t> clamped{0};
   const size_t count = channels.size(), width = static_cast<size_t>(channels[0].plane->width);
   parallelRows(end - begin, [&](int row) {
@@ -190,8 +188,7 @@ uint64_t interleave(const std::vector<Channel>& channels, int begin, int end, st
 WriteReport writeExr(const std::string& path, const Estimates& estimates, const Rgb<float>& headline,
                      const Plane<float>* alpha, const ExrOptions& options) {
   BRAID_ASSERT(!headline.empty());
-  const ChannelList list = collectChannels(estimates, headline, alpha, options);
-  const std::vector<Channel>& channels = list.list();
+  const std::vector<NamedPlane> channels = namedPlanes(estimates, headline, alpha, options);
   const OIIO::ImageSpec spec = makeSpec(estimates, channels);
 
   OutputFile file(path, ".exr");

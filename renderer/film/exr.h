@@ -5,6 +5,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "renderer/core/plane.h"
 #include "renderer/film/estimates.h"
@@ -26,6 +27,17 @@ struct ExrOptions {
   std::string layerPrefix;       // e.g. "ViewLayer": put before every channel but R G B A
   std::vector<ExrLayer> layers;  // written with AovSet::All
 };
+
+// A plane under the channel name that it has in files, such as "R", "Albedo.R" or "pt.mean.R".
+struct NamedPlane {
+  std::string name;
+  const Plane<float>* plane;
+  bool half = false;  // stored with 16 bits
+};
+
+// The channels that writeExr() writes, in its order; the planes are those of the arguments.
+std::vector<NamedPlane> namedPlanes(const Estimates& estimates, const Rgb<float>& headline, const Plane<float>* alpha,
+                                    const ExrOptions& options);
 
 struct WriteReport {
   uint64_t clampedToHalf = 0;  // headline values above 65504

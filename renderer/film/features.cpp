@@ -86,4 +86,14 @@ Plane<float> FeatureAccumulator::variance(int component) const {
   return out;
 }
 
+void CoverageAccumulator::commit(const PassTarget& target) {
+  BRAID_ASSERT(target.wantsCoverage() && target.width_ == sum_.width && target.height_ == sum_.height);
+  parallelChunks(sum_.size(), 4096, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) sum_[i] += static_cast<double>(target.coverage_[i]);
+  });
+  ++count_;
+}
+
+Plane<float> CoverageAccumulator::mean() const { return ratio(sum_, nullptr, count_); }
+
 }  // namespace braid

@@ -45,10 +45,11 @@ void commitRow(const float* __restrict own, const int64_t* __restrict splats, do
 
 }  // namespace
 
-PassTarget::PassTarget(int width, int height, bool splats, bool features)
+PassTarget::PassTarget(int width, int height, bool splats, bool features, bool coverage)
     : width_(width), height_(height), own_(width, height) {
   if (splats) splats_.assign(3 * own_.size(), 0);
   if (features) features_.assign(FeatureSample::kComponents, Plane<float>(width, height));
+  if (coverage) coverage_ = Plane<float>(width, height);
 }
 
 bool PassTarget::add(int x, int y, const Spectrum& value) {
@@ -104,6 +105,7 @@ void PassTarget::clear() {
     const size_t begin = static_cast<size_t>(y) * width;
     for (size_t c = 0; c < 3; ++c) std::fill_n(own_[c].data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
     for (Plane<float>& f : features_) std::fill_n(f.data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
+    if (!coverage_.empty()) std::fill_n(coverage_.data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
     if (!splats_.empty()) std::fill_n(splats_.begin() + static_cast<std::ptrdiff_t>(3 * begin), 3 * width, int64_t(0));
   });
   rejected_ = 0;

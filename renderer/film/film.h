@@ -34,11 +34,12 @@ struct FeatureSample {
 // be called by any thread for any pixel: integer sums commute, so the result does not depend on the order.
 class PassTarget {
  public:
-  PassTarget(int width, int height, bool splats, bool features);
+  PassTarget(int width, int height, bool splats, bool features, bool coverage = false);
 
   int width() const { return width_; }
   int height() const { return height_; }
   bool wantsFeatures() const { return !features_.empty(); }
+  bool wantsCoverage() const { return !coverage_.empty(); }
 
   // Sets the value of the task's own pixel in this pass. A non-finite or negative value counts as a sample of value 0
   // and is counted as rejected; returns false then.
@@ -50,6 +51,8 @@ class PassTarget {
   // and nothing else. Default 32; call before the first splat of a pass.
   void setSplatFractionBits(int bits);
   void features(int x, int y, const FeatureSample& sample);
+  // How much of the pixel the camera path saw covered, in [0, 1]; only when wantsCoverage().
+  void coverage(int x, int y, float value) { coverage_.at(x, y) = value; }
 
   // Zeroes everything, for the next pass; keeps the allocation.
   void clear();
@@ -59,11 +62,13 @@ class PassTarget {
  private:
   friend class Accumulator;
   friend class FeatureAccumulator;
+  friend class CoverageAccumulator;
 
   int width_, height_;
   Rgb<float> own_;
   std::vector<int64_t> splats_;         // 3 per pixel, interleaved; empty when the integrator does not splat
   std::vector<Plane<float>> features_;  // FeatureSample::kComponents planes, or empty
+  Plane<float> coverage_;               // or empty
   double splatScale_ = 4294967296.0;    // fixed-point units per 1
   double splatClamp_ = 4194304.0;
   std::atomic<uint64_t> rejected_{0}, clampedSplats_{0};
@@ -135,6 +140,19 @@ class FeatureAccumulator {
   std::vector<Plane<double>> sum_[2];  // per half, per component
   std::vector<Plane<double>> sumsq_;
   uint64_t count_[2] = {0, 0};
+};
+
+// The alpha channel: mean coverage of the pixels, 8 bytes a pixel.
+class CoverageAccumulator {
+ public:
+  CoverageAccumulator(int width, int height) : sum_(width, height) {}
+  void commit(const PassTarget& target);
+  uint64_t passes() const { return count_; }
+  Plane<float> mean() const;
+
+ private:
+  Plane<double> sum_;
+  uint64_t count_ = 0;
 };
 
 }  // namespace braid

@@ -2,6 +2,7 @@
 // Embree 3 and 4 differ only in how a query gets its context: see the functions under BRAID_EMBREE4.
 #include "renderer/scene/accel.h"
 
+#include <algorithm>
 #include <atomic>
 #include <new>
 
@@ -18,23 +19,6 @@ namespace {
 bool countMemory(void* counter, ssize_t bytes, bool) {
   static_cast<std::atomic<int64_t>*>(counter)->fetch_add(bytes, std::memory_order_relaxed);
   return true;
-}
-
-// Lane i of a packet or, with N = 1, a single ray: Embree's structures of arrays have the same member names for every width.
-template <class Packet>
-void setLane(Packet& q, int i, const RayQuery& r) {
-  q.org_x[i] = r.origin.x;
-  q.org_y[i] = r.origin.y;
-  q.org_z[i] = r.origin.z;
-  q.tnear[i] = 0;
-  q.dir_x[i] = r.direction.x;
-  q.dir_y[i] = r.direction.y;
-  q.dir_z[i] = r.direction.z;
-  q.time[i] = 0;
-  q.tfar[i] = r.tmax;
-  q.mask[i] = ~0u;
-  q.id[i] = r.salt;  // handed back to the filter
-  q.flags[i] = 0;
 }
 
 RTCRay singleRay(const RayQuery& r) {
@@ -176,59 +160,64 @@ void Accel::resolve(uint32_t geometry, uint32_t instance, RayHit& hit) const {
   }
 }
 
-void Accel::intersect(const RayQuery* rays, int count, RayHit* hits) const {
-  if (!packets_ || count == 1) {
-    for (int i = 0; i < count; ++i) {
-      RTCRayHit query;
-      query.ray = singleRay(rays[i]);
-      query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-      embreeIntersect1(scene_, query);
-      const bool found = query.hit.geomID != RTC_INVALID_GEOMETRY_ID;
-      hits[i].t = found ? query.ray.tfar : kInfinity;
-      if (!found) continue;
-      hits[i].u = query.hit.u;
-      hits[i].v = query.hit.v;
-      hits[i].triangle = query.hit.primID;
-      resolve(query.hit.geomID, query.hit.instID[0], hits[i]);
+void Accel::intersect(RayBatch& rays, int count, RayHit* hits) const {
+  for (int first = 0; first < count; first += kPacket) {
+    const int lanes = std::min(kPacket, count - first);
+    if (!packets_ || lanes == 1) {
+      for (int i = first; i < first + lanes; ++i) intersectSingle(rays.get(i), hits[i]);
+      continue;
     }
-    return;
-  }
-  alignas(32) int valid[kPacket];
-  RTCRayHit8 query;
-  for (int i = 0; i < kPacket; ++i) {
-    valid[i] = i < count ? -1 : 0;
-    setLane(query.ray, i, rays[i < count ? i : 0]);
-    query.hit.geomID[i] = query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-  }
-  embreeIntersect8(valid, scene_, query);
-  for (int i = 0; i < count; ++i) {
-    const bool found = query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
-    hits[i].t = found ? query.ray.tfar[i] : kInfinity;
-    if (!found) continue;
-    hits[i].u = query.hit.u[i];
-    hits[i].v = query.hit.v[i];
-    hits[i].triangle = query.hit.primID[i];
-    resolve(query.hit.geomID[i], query.hit.instID[0][i], hits[i]);
+    RTCRayHit8& query = rays.packet(first);
+    alignas(32) int valid[kPacket];
+    for (int i = 0; i < kPacket; ++i) {
+      valid[i] = i < lanes ? -1 : 0;
+      query.hit.geomID[i] = query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    }
+    embreeIntersect8(valid, scene_, query);
+    for (int i = 0; i < lanes; ++i) {
+      RayHit& hit = hits[first + i];
+      const bool found = query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+      hit.t = found ? query.ray.tfar[i] : kInfinity;
+      if (!found) continue;
+      hit.u = query.hit.u[i];
+      hit.v = query.hit.v[i];
+      hit.triangle = query.hit.primID[i];
+      resolve(query.hit.geomID[i], query.hit.instID[0][i], hit);
+    }
   }
 }
 
-void Accel::occluded(const RayQuery* rays, int count, bool* results) const {
-  if (!packets_ || count == 1) {
-    for (int i = 0; i < count; ++i) {
-      RTCRay ray = singleRay(rays[i]);
-      embreeOccluded1(scene_, ray);
-      results[i] = ray.tfar < 0;
+void Accel::intersectSingle(const RayQuery& ray, RayHit& hit) const {
+  RTCRayHit query;
+  query.ray = singleRay(ray);
+  query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  embreeIntersect1(scene_, query);
+  hit.t = kInfinity;
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
+  hit.t = query.ray.tfar;
+  hit.u = query.hit.u;
+  hit.v = query.hit.v;
+  hit.triangle = query.hit.primID;
+  resolve(query.hit.geomID, query.hit.instID[0], hit);
+}
+
+void Accel::occluded(ShadowBatch& rays, int count, bool* results) const {
+  for (int first = 0; first < count; first += kPacket) {
+    const int lanes = std::min(kPacket, count - first);
+    if (!packets_ || lanes == 1) {
+      for (int i = first; i < first + lanes; ++i) {
+        RTCRay ray = singleRay(rays.get(i));
+        embreeOccluded1(scene_, ray);
+        results[i] = ray.tfar < 0;
+      }
+      continue;
     }
-    return;
+    RTCRay8& query = rays.packet(first);
+    alignas(32) int valid[kPacket];
+    for (int i = 0; i < kPacket; ++i) valid[i] = i < lanes ? -1 : 0;
+    embreeOccluded8(valid, scene_, query);
+    for (int i = 0; i < lanes; ++i) results[first + i] = query.tfar[i] < 0;
   }
-  alignas(32) int valid[kPacket];
-  RTCRay8 query;
-  for (int i = 0; i < kPacket; ++i) {
-    valid[i] = i < count ? -1 : 0;
-    setLane(query, i, rays[i < count ? i : 0]);
-  }
-  embreeOccluded8(valid, scene_, query);
-  for (int i = 0; i < count; ++i) results[i] = query.tfar[i] < 0;
 }
 
 void Accel::filterCallback(const RTCFilterFunctionNArguments* args) {

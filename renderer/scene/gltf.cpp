@@ -49,9 +49,9 @@ void addDefaults(SceneData& scene, const LoadOptions& options, Report& report) {
     report.warn("", "the file has no camera; one is added that sees the whole scene");
   }
   if (options.defaultLight && !hasLight(scene)) {
-    scene.environment = EnvironmentData{nullptr, Spectrum(1), 0};
+    scene.environment = EnvironmentData{nullptr, Spectrum(0.5f), 0};
     scene.defaultLight = true;
-    report.warn("", "the file has no light; a grey dome of radiance 1 is added");
+    report.warn("", "the file has no light; a grey dome of radiance 0.5 is added");
   }
 }
 

@@ -105,10 +105,17 @@ CameraData framingCamera(const SceneData& scene) {
     camera.toWorld = lookAlong(Vec3(0, 0, 3), Vec3(0, 0, 1));
     return camera;
   }
-  const float radius = 0.5f * glm::length(bounds.diagonal());
   const Vec3 back = viewDirection(scene, bounds);
-  const float distance = (radius > 0 ? radius : 1.0f) / std::sin(0.5f * kDefaultYfov);
-  camera.toWorld = lookAlong(bounds.centre() + back * (1.02f * distance), back);
+  const Mat4 orientation = lookAlong(Vec3(0), back);
+  // The nearest distance from which every corner of the bounds lies in a frame of aspect 4:3, with a margin of 5 %.
+  const float tanY = std::tan(0.5f * kDefaultYfov) / 1.05f, tanX = tanY * 4 / 3;
+  float distance = 0;
+  for (int k = 0; k < 8; ++k) {
+    const Vec3 d = corner(bounds, k) - bounds.centre();
+    const float x = std::abs(glm::dot(d, Vec3(orientation[0]))), y = std::abs(glm::dot(d, Vec3(orientation[1])));
+    distance = std::max(distance, glm::dot(d, back) + std::max(x / tanX, y / tanY));
+  }
+  camera.toWorld = lookAlong(bounds.centre() + back * (distance > 0 ? distance : 3.0f), back);
   return camera;
 }
 

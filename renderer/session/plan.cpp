@@ -72,6 +72,7 @@ void planFilm(const Settings& settings, Plan& plan) {
   const uint64_t accumulator = plan.buckets == 4 ? 120 : 72;
   plan.filmBytesPerPixel = accumulator * plan.integrators.size() + 12;
   if (plan.features) plan.filmBytesPerPixel += FeatureSample::kComponents * (3 * 8 + 4);
+  if (settings.transparent) plan.filmBytesPerPixel += 12;
   plan.lines.push_back({plan.buckets == 4, "quarter buckets", plan.buckets == 4 ? "asked for" : "no output or combiner reads quarters: two half buffers"});
   plan.lines.push_back({plan.features, "features", plan.features ? "albedo, normal, depth, visibility for outputs" : "no output or combiner reads them"});
   plan.lines.push_back({true, "film", fmt::format("{} bytes a pixel, {:.1f} MiB", plan.filmBytesPerPixel,

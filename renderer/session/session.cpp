@@ -49,6 +49,7 @@ Session::Session(const Scene& scene, Plan plan) : scene_(scene), plan_(std::move
   for (size_t i = 0; i < plan_.integrators.size(); ++i) accumulators_.emplace_back(plan_.window.width(), plan_.window.height(), plan_.buckets);
   seconds_.assign(plan_.integrators.size(), 0.0);
   if (plan_.features) features_ = std::make_unique<FeatureAccumulator>(plan_.window.width(), plan_.window.height());
+  if (plan_.settings.transparent) coverage_ = std::make_unique<CoverageAccumulator>(plan_.window.width(), plan_.window.height());
 }
 
 RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bool>* cancel, const std::atomic<bool>* abandon) {
@@ -59,7 +60,7 @@ RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bo
   arena.execute([&] {
     bool splats = false;
     for (const PlannedIntegrator& p : plan_.integrators) splats = splats || p.integrator->splats();
-    PassTarget target(plan_.window.width(), plan_.window.height(), splats, plan_.features);
+    PassTarget target(plan_.window.width(), plan_.window.height(), splats, plan_.features, plan_.settings.transparent);
     const Clock clock;
     const auto isSet = [](const std::atomic<bool>* flag) { return flag && flag->load(); };
     for (;;) {
@@ -81,6 +82,7 @@ RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bo
             result.firstRejected = {plan_.integrators[i].integrator->name(), pass, static_cast<int>(rejected % settings.width), static_cast<int>(rejected / settings.width)};
           accumulators_[i].commit(pass, target);
           if (i == 0 && features_) features_->commit(pass, target);
+          if (i == 0 && coverage_) coverage_->commit(target);
         }
         seconds_[i] += passClock.seconds();
       }
@@ -110,6 +112,7 @@ RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bo
   result.shadowRays = statistics.shadowRays;
   for (const Accumulator& a : accumulators_) result.rejected += a.rejected();
   result.image = result.estimates->estimates.front().mean;
+  if (coverage_) result.alpha = coverage_->mean();
   return result;
 }
 

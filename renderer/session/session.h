@@ -68,6 +68,7 @@ class Session {
   std::vector<Accumulator> accumulators_;
   std::vector<double> seconds_;
   std::unique_ptr<FeatureAccumulator> features_;
+  std::unique_ptr<CoverageAccumulator> coverage_;  // with a transparent background
 };
 
 }  // namespace braid

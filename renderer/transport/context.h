@@ -15,15 +15,22 @@ struct RecordedRay : RayQuery {
   bool shadow = false;
 };
 
+// What shading asks of every material, in eight bytes: materials themselves are large.
+struct MaterialSummary {
+  uint32_t lobes = 0;  // LobeFlags
+  bool emissive = false, unlit = false, volume = false;
+  bool special() const { return emissive || unlit || volume; }
+};
+
 struct TransportContext {
   const Scene& scene;
   LightSampler lights;
-  std::vector<uint32_t> lobes;  // LobeFlags per material
+  std::vector<MaterialSummary> materials;
 
   explicit TransportContext(const Scene& s, LightStrategy strategy = LightStrategy::Automatic) : scene(s), lights(s, strategy) {
-    for (const Material& m : s.materials()) lobes.push_back(materialLobes(m));
+    for (const Material& m : s.materials()) materials.push_back({materialLobes(m), m.emissive(), m.unlit, m.hasVolume()});
   }
-  uint32_t lobesOf(const Hit& hit) const { return lobes[hit.mesh->material]; }
+  const MaterialSummary& summaryOf(const Hit& hit) const { return materials[hit.mesh->material]; }
 };
 
 }  // namespace braid

@@ -59,7 +59,7 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
   // TRAP: the bound must not be taken coordinate by coordinate: on the plane z = 0 it would be 0, yet Embree's distance to that plane has the
   // rounding errors of the triangle's other coordinates in it.
   const Vec3 largest3 = glm::max(glm::max(glm::abs(p0), glm::abs(p1)), glm::abs(p2));
-  hit.positionError = Vec3(gammaBound(8) * maxComponent(largest3));
+  hit.positionError = gammaBound(8) * maxComponent(largest3);
   Vec3 ng = glm::cross(p1 - p0, p2 - p0);
   Vec3 ns = mesh.normals.empty() ? ng : interpolate(mesh.normals, index, u, v);
   Vec4 tangent = mesh.tangents.empty() ? Vec4(0) : interpolate(mesh.tangents, index, u, v);
@@ -69,8 +69,8 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
     const Mat3 linear(instance.toWorld);
     const Mat3 absolute(glm::abs(linear[0]), glm::abs(linear[1]), glm::abs(linear[2]));
     const Vec3 translation(instance.toWorld[3]);
-    const Vec3 rounding = (1 + gammaBound(3)) * (absolute * hit.positionError) + gammaBound(4) * (absolute * glm::abs(hit.position) + glm::abs(translation));
-    hit.positionError = Vec3(maxComponent(rounding));
+    const Vec3 rounding = (1 + gammaBound(3)) * (absolute * Vec3(hit.positionError)) + gammaBound(4) * (absolute * glm::abs(hit.position) + glm::abs(translation));
+    hit.positionError = maxComponent(rounding);
     hit.position = linear * hit.position + translation;
     // Normals go by the inverse transpose; that keeps the front side also in a mirrored instance.
     const Mat3 normalMatrix = glm::transpose(Mat3(instance.toObject));
@@ -91,7 +91,8 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
   hit.smoothNormal = ns;
 
   const Material& material = *hit.material;
-  if (mesh.tangents.empty()) {
+  // Tangents that the material does not read must not turn the frame: an image would depend on what the loader keeps.
+  if (mesh.tangents.empty() || !material.needsTangents()) {
     hit.frame = Frame(hit.front ? ns : -ns);
   } else {
     Frame frame = tangentFrame(ns, tangent);
@@ -106,13 +107,6 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
   }
   hit.ng = hit.front ? ng : -ng;
   if (!hit.front) hit.smoothNormal = -hit.smoothNormal;
-}
-
-Vec3 offsetOrigin(const Vec3& position, const Vec3& error, const Vec3& ng, const Vec3& direction) {
-  const float d = 2 * glm::dot(glm::abs(ng), error);
-  Vec3 offset = d * ng;
-  if (glm::dot(direction, ng) < 0) offset = -offset;
-  return position + offset;
 }
 
 uint32_t materialLobes(const Material& m) {

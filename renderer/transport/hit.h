@@ -10,7 +10,7 @@ namespace braid {
 
 struct Hit {
   Vec3 position;
-  Vec3 positionError;  // absolute bound of the rounding error of each coordinate, metres
+  float positionError; // bound of the rounding error of the position and of ray queries there, metres
   Vec3 wo;             // unit, back along the ray
   Vec3 ng;             // unit geometric normal on the side of wo
   Frame frame;         // shading frame; n is the shading normal, on the front side when `front`, else turned with ng
@@ -28,7 +28,10 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
 
 // Lifts a point off its surface, along the normal and to the side that `direction` points to, by just more than the point's error bound, so that
 // a ray from there cannot hit the surface it leaves: no fixed epsilon, so 2 cm and 1600 m scenes both work.
-Vec3 offsetOrigin(const Vec3& position, const Vec3& error, const Vec3& ng, const Vec3& direction);
+inline Vec3 offsetOrigin(const Vec3& position, float error, const Vec3& ng, const Vec3& direction) {
+  const float reach = 2 * error * (std::abs(ng.x) + std::abs(ng.y) + std::abs(ng.z));
+  return position + std::copysign(reach, glm::dot(direction, ng)) * ng;
+}
 inline Vec3 offsetOrigin(const Hit& hit, const Vec3& direction) { return offsetOrigin(hit.position, hit.positionError, hit.ng, direction); }
 
 // The lobes that a material can have anywhere on a surface (LobeFlags).

@@ -36,9 +36,14 @@ LightBounds boundsOf(const PunctualLight& light) {
   return b;
 }
 
-std::vector<float> cumulativeOf(const std::vector<double>& weight) {
+std::vector<float> cumulativeOf(std::vector<double> weight) {
   std::vector<float> cumulative(weight.size() + 1, 0.0f);
   double total = 0;
+  for (double w : weight) total += w;
+  // TRAP: a share below the resolution of a float would be 0 and a dim point light beside a very bright one never chosen.
+  for (double& w : weight)
+    if (w > 0) w = std::max(w, total * 0x1p-20);
+  total = 0;
   for (double w : weight) total += w;
   double sum = 0;
   for (size_t i = 0; i < weight.size(); ++i) {
@@ -54,7 +59,7 @@ size_t pick(const std::vector<float>& cumulative, float& u, float& probability) 
   const size_t count = cumulative.size() - 1;
   size_t i = 0;
   if (count <= 8) {
-    while (i + 1 < count && u >= cumulative[i + 1]) ++i;
+    for (size_t k = 1; k < count; ++k) i += u >= cumulative[k] ? 1u : 0u;
   } else {
     i = static_cast<size_t>(std::upper_bound(cumulative.begin() + 1, cumulative.end() - 1, u) - cumulative.begin() - 1);
   }
@@ -119,25 +124,24 @@ LightSampler::LightSampler(const Scene& scene, LightStrategy strategy) : scene_(
   }
 }
 
-bool LightSampler::sampleEmitter(const EmissiveTriangle& e, const Vec3& p, Vec2 u, LightSample& out) const {
+bool LightSampler::sampleEmitter(const EmissiveTriangle& e, const Vec3& p, const Vec3& n, bool twoSided, Vec2 u, LightSample& out) const {
   // Uniform by area (Heitz 2019: a low-distortion map of the square to the triangle).
-  float b1 = u.x, b2 = u.y;
-  if (b2 > b1) {
-    b1 *= 0.5f;
-    b2 -= b1;
-  } else {
-    b2 *= 0.5f;
-    b1 -= b2;
-  }
+  const bool upper = u.y > u.x;
+  const float half = 0.5f * select(upper, u.x, u.y);
+  const float b1 = select(upper, half, u.x - half), b2 = select(upper, u.y - half, half);
   const Vec3 point = e.p0 + b1 * e.e1 + b2 * e.e2;
   const Vec3 d = point - p;
   const float distance2 = glm::dot(d, d);
   if (!(distance2 > 0)) return false;
-  out.distance = std::sqrt(distance2);
-  out.wi = d / out.distance;
-  float cosLight = -glm::dot(out.wi, e.normal);
+  float cosLight = -glm::dot(d, e.normal);
   if (e.twoSided) cosLight = std::abs(cosLight);
   if (!(cosLight > 0)) return false;
+  // The receiver's side first: half of all samples end here, before the square root.
+  if (!twoSided && !(glm::dot(d, n) > 0)) return false;
+  out.distance = std::sqrt(distance2);
+  const float inverse = 1 / out.distance;
+  out.wi = d * inverse;
+  cosLight *= inverse;
   out.radiance = e.textured ? scene_.emission(scene_.mesh(e.mesh), e.triangle, b1, b2) : e.meanRadiance;
   out.pdfW = distance2 / (cosLight * e.area);
   out.delta = false;
@@ -164,7 +168,7 @@ bool LightSampler::sample(const Vec3& p, const Vec3& n, bool twoSided, float uSe
     const size_t light = hierarchy_ ? tree_.sample(p, n, twoSided, select, probability) : pick(cumulative_, select, probability);
     if (!(probability > 0)) return false;
     const size_t emitters = scene_.emitters().size();
-    const bool ok = light < emitters ? sampleEmitter(scene_.emitters()[light], p, u, out)
+    const bool ok = light < emitters ? sampleEmitter(scene_.emitters()[light], p, n, twoSided, u, out)
                                      : samplePunctual(scene_.lights()[positional_[light - emitters]], p, out);
     out.pdfW *= probability * probabilityFinite_;
     return ok && out.pdfW > 0;

@@ -31,7 +31,7 @@ class LightSampler {
   // Automatic: see hierarchyPays().
   LightSampler(const Scene& scene, LightStrategy strategy);
 
-  // Samples a light for the point p with shading normal n; `twoSided`: the surface transmits. False: no light can contribute.
+  // Samples a light for the point p with shading normal n (not zero unless twoSided); `twoSided`: the surface transmits. False: no light can contribute.
   bool sample(const Vec3& p, const Vec3& n, bool twoSided, float uSelect, Vec2 u, LightSample& out) const;
 
   // Density with which sample() would pick the direction to a point hit on emitter `index` (distance in metres, cosine at the light > 0).
@@ -43,7 +43,7 @@ class LightSampler {
   size_t bytes() const { return tree_.bytes() + cumulative_.size() * sizeof(float); }
 
  private:
-  bool sampleEmitter(const EmissiveTriangle& e, const Vec3& p, Vec2 u, LightSample& out) const;
+  bool sampleEmitter(const EmissiveTriangle& e, const Vec3& p, const Vec3& n, bool twoSided, Vec2 u, LightSample& out) const;
   bool samplePunctual(const PunctualLight& light, const Vec3& p, LightSample& out) const;
   float finiteProbability(const Vec3& p, const Vec3& n, bool twoSided, size_t light) const;
 

@@ -60,6 +60,13 @@ float splitCost(const LightBounds& b, const Vec3& parentDiagonal, int dimension)
   return b.power * orientation * regular * area;
 }
 
+// The share of the left one of two nodes. A node that may contribute keeps a chance worth a float's digits: the other, however bright, may be hidden.
+float leftProbability(float left, float right) {
+  constexpr float kLeast = 0x1p-10f;
+  const float p = left / (left + right);
+  return left > 0 && right > 0 ? std::clamp(p, kLeast, 1 - kLeast) : p;
+}
+
 }  // namespace
 
 void LightTree::build(const std::vector<LightBounds>& lights) {
@@ -194,7 +201,7 @@ uint32_t LightTree::sample(const Vec3& p, const Vec3& n, bool twoSided, float& u
       probability = 0;
       return 0;
     }
-    const float pLeft = a / sum;
+    const float pLeft = leftProbability(a, b);
     if (u < pLeft) {
       u = std::min(u / pLeft, kOneMinusEpsilon);
       probability *= pLeft;
@@ -219,7 +226,7 @@ float LightTree::probability(const Vec3& p, const Vec3& n, bool twoSided, uint32
     const float a = importance(nodes_[left], p, n, twoSided), b = importance(nodes_[right], p, n, twoSided);
     const float sum = a + b;
     if (!(sum > 0) || !std::isfinite(sum)) return 0;
-    const float pLeft = a / sum;
+    const float pLeft = leftProbability(a, b);
     if (target < first + nodes_[i].leftLeaves) {
       result *= pLeft;
       i = left;

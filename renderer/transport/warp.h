@@ -48,11 +48,11 @@ inline float turnOf(float x, float y) {
 inline Vec2 squareToDisc(const Vec2& u) {
   const float a = 2 * u.x - 1, b = 2 * u.y - 1;
   const bool wide = std::fabs(a) > std::fabs(b);
-  const float r = wide ? a : b;
-  const float other = wide ? b : a;
+  const float r = select(wide, a, b);
+  const float other = select(wide, b, a);
   // TRAP: the centre of the square has no angle; any angle will do, 0/0 will not.
   const SinCos t = sinCosQuarter(r != 0 ? (0.25f * kPi) * (other / r) : 0.0f);
-  return wide ? Vec2(r * t.cos, r * t.sin) : Vec2(r * t.sin, r * t.cos);
+  return r * Vec2(select(wide, t.cos, t.sin), select(wide, t.sin, t.cos));
 }
 
 inline float discPdfA() { return kInvPi; }
