@@ -98,7 +98,7 @@ class Accumulator {
   // passes of a bucket share a low-discrepancy sequence.
   Rgb<float> passVariance() const;
   // The calibrated variance of the mean. `lowDiscrepancy` false: passVariance(). True: passVariance() rescaled by the
-  // ratio of 21x21 box averages of the variance between buckets (independent scrambles) to passVariance()
+  // ratio of 9x9 box averages of the variance between buckets (independent scrambles) to passVariance()
   // (ALGORITHMS 4.6 step 1); buckets of unequal counts are weighted.
   Rgb<float> variance(bool lowDiscrepancy) const;
 
