@@ -78,7 +78,7 @@ float spotFalloff(const PunctualLight& light, float cosAngle) {
 
 bool hierarchyPays(size_t emissiveTriangles, size_t positionalLights) {
   const size_t finite = emissiveTriangles + positionalLights;
-  return finite > 4 || (finite > 1 && positionalLights > 0);
+  return finite > 8 || (finite > 1 && positionalLights > 0);
 }
 
 LightSampler::LightSampler(const Scene& scene, LightStrategy strategy) : scene_(scene) {

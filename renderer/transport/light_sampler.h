@@ -22,7 +22,7 @@ struct LightSample {
 // How finite lights are chosen.
 enum class LightStrategy { Automatic, Power, Hierarchy };
 
-// Whether a light hierarchy is worth its cost: not for up to 4 emissive triangles (one or two area lights), where choosing by power is as good; yes as
+// Whether a light hierarchy is worth its cost: not for up to 8 emissive triangles (a few area lights), where choosing by power is as good or better; yes as
 // soon as distances and cones of several lights differ from point to point.
 bool hierarchyPays(size_t emissiveTriangles, size_t positionalLights);
 
