@@ -37,7 +37,8 @@ void PathKernel::addEnvironment(const PathState& path, PathSample& sample) const
   }
   if (fromCamera && plan_.settings.transparent) return;
   float weight = 1;
-  if (!path.lightCouldNotBeSampled) weight = powerHeuristic(path.lastPdfW, context_.lights.pdfEnvironment(path.direction));
+  if (!path.lightCouldNotBeSampled)
+    weight = powerHeuristic(path.lastPdfW, context_.lights.pdfEnvironment(path.direction));
   sample.radiance += path.throughput * radiance * weight;
 }
 
@@ -52,20 +53,24 @@ void PathKernel::addEmission(const PathState& path, const Hit& hit, PathSample& 
     const float cosLight = glm::dot(hit.wo, hit.ng);
     if (emitter >= 0 && cosLight > 0) {
       const float distance = glm::length(hit.position - path.lastPosition);
-      weight = powerHeuristic(path.lastPdfW, context_.lights.pdfEmitter(path.lastPosition, path.lastNormal, path.lastTwoSided,
-                                                                        static_cast<size_t>(emitter), distance, cosLight));
+      weight = powerHeuristic(path.lastPdfW,
+                              context_.lights.pdfEmitter(path.lastPosition, path.lastNormal, path.lastTwoSided,
+                                                         static_cast<size_t>(emitter), distance, cosLight));
     }
   }
   sample.radiance += path.throughput * radiance * weight;
 }
 
-// A solid's surface inside a solid that rules there scatters nothing: keeps the books of what the path is inside of and goes on straight.
+// A solid's surface inside a solid that rules there scatters nothing: keeps the books of what the path is inside of and
+// goes on straight.
 bool PathKernel::crossNullInterface(PathState& path, const Hit& hit) const {
   const uint32_t material = hit.mesh->material;
   const int64_t other = path.media.ruling(scene_.materials(), hit.front ? -1 : static_cast<int64_t>(material));
   if (other < 0 || !MediaStack::outranks(scene_.materials(), other, static_cast<int64_t>(material))) return false;
-  if (hit.front) path.media.enter(material);
-  else path.media.leave(material);
+  if (hit.front)
+    path.media.enter(material);
+  else
+    path.media.leave(material);
   path.origin = offsetOrigin(hit, path.direction);
   path.featureDistance += hit.distance;
   path.lightCouldNotBeSampled = true;  // a shadow ray stops at the interface
@@ -93,7 +98,8 @@ void PathKernel::attenuate(PathState& path, float distance) const {
 // Refractive index on the outside of a hit surface.
 float PathKernel::indexOutside(const PathState& path, const Hit& hit) const {
   if (path.media.empty()) return 1;
-  const int64_t medium = path.media.ruling(scene_.materials(), hit.front ? -1 : static_cast<int64_t>(hit.mesh->material));
+  const int64_t medium =
+      path.media.ruling(scene_.materials(), hit.front ? -1 : static_cast<int64_t>(hit.mesh->material));
   return medium < 0 ? 1.0f : scene_.materials()[static_cast<size_t>(medium)].ior;
 }
 
@@ -107,7 +113,8 @@ void PathKernel::recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsd
   sample.features.depth = path.featureDistance;
 }
 
-bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const SampleBlock& block, ShadowRay& shadow) const {
+bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided,
+                             const SampleBlock& block, ShadowRay& shadow) const {
   LightSample light;
   if (!context_.lights.sample(hit.position, receiverNormal(hit, twoSided), twoSided, block.u[slot::kLightSelect],
                               {block.u[slot::kLightU], block.u[slot::kLightV]}, light))
@@ -125,7 +132,8 @@ bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Bsdf& 
   shadow.ray.direction = light.wi;
   shadow.ray.tmax = kInfinity;
   if (light.distance < kInfinity) {
-    // TRAP: aimed anew from the moved origin. On a large triangle the move is longer than the margin before a near light: the light would hide itself.
+    // TRAP: aimed anew from the moved origin. On a large triangle the move is longer than the margin before a near
+    // light: the light would hide itself.
     shadow.ray.direction = hit.position + light.wi * light.distance - shadow.ray.origin;
     shadow.ray.tmax = kShadowLength;
   }
@@ -135,13 +143,15 @@ bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Bsdf& 
     MediaStack media = path.media;
     if (!reflects && volume) hit.front ? media.enter(hit.mesh->material) : media.leave(hit.mesh->material);
     const int64_t medium = media.ruling(scene_.materials());
-    if (medium >= 0) shadow.contribution *= volumeTransmittance(scene_.materials()[static_cast<size_t>(medium)], light.distance);
+    if (medium >= 0)
+      shadow.contribution *= volumeTransmittance(scene_.materials()[static_cast<size_t>(medium)], light.distance);
   }
   return true;
 }
 
 // Continues the path in a direction sampled from the BSDF; false when it ends here.
-bool PathKernel::scatter(PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const SampleBlock& block) const {
+bool PathKernel::scatter(PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided,
+                         const SampleBlock& block) const {
   BsdfSample sample;
   if (!bsdf.sample(block.u[slot::kLobe], {block.u[slot::kBsdfU], block.u[slot::kBsdfV]}, sample)) return false;
   const Vec3 direction = renormalize(hit.frame.toWorld(sample.wi));
@@ -154,7 +164,9 @@ bool PathKernel::scatter(PathState& path, const Hit& hit, const Bsdf& bsdf, bool
     const int64_t before = path.media.ruling(scene_.materials());
     hit.front ? path.media.enter(hit.mesh->material) : path.media.leave(hit.mesh->material);
     const int64_t after = path.media.ruling(scene_.materials());
-    const auto index = [&](int64_t m) { return m < 0 ? 1.0f : std::max(scene_.materials()[static_cast<size_t>(m)].ior, 1e-3f); };
+    const auto index = [&](int64_t m) {
+      return m < 0 ? 1.0f : std::max(scene_.materials()[static_cast<size_t>(m)].ior, 1e-3f);
+    };
     path.etaScale *= sqr(index(before) / index(after));
   }
   path.origin = offsetOrigin(hit, direction);
@@ -180,8 +192,10 @@ void PathKernel::start(int x, int y, uint64_t key) {
   const SampleBlock camera = sampler_.block(key, 0);
   const PixelFilter filter = plan_.settings.filter;
   Vec2 offset(camera.u[slot::kPixelX] - 0.5f, camera.u[slot::kPixelY] - 0.5f);
-  if (filter != PixelFilter::Box) offset = {sampleFilter(filter, camera.u[slot::kPixelX]), sampleFilter(filter, camera.u[slot::kPixelY])};
-  const Camera::CameraRay ray = plan_.camera.ray(Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) + offset);
+  if (filter != PixelFilter::Box)
+    offset = {sampleFilter(filter, camera.u[slot::kPixelX]), sampleFilter(filter, camera.u[slot::kPixelY])};
+  const Camera::CameraRay ray =
+      plan_.camera.ray(Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) + offset);
   const auto i = static_cast<size_t>(count_++);
   sample_[i] = PathSample();
   PathState& path = path_[i];
@@ -246,7 +260,8 @@ void PathKernel::shadeActive() {
     const int p = active_[static_cast<size_t>(a)];
     const auto i = static_cast<size_t>(p);
     bool hasShadow = false;
-    const bool goesOn = shade(path_[i], hit_[static_cast<size_t>(a)], sample_[i], shadow_[static_cast<size_t>(shadowCount_)], hasShadow);
+    const bool goesOn = shade(path_[i], hit_[static_cast<size_t>(a)], sample_[i],
+                              shadow_[static_cast<size_t>(shadowCount_)], hasShadow);
     if (hasShadow) {
       shadowRays_.set(shadowCount_, shadow_[static_cast<size_t>(shadowCount_)].ray);
       shadowPath_[static_cast<size_t>(shadowCount_++)] = p;
@@ -295,7 +310,8 @@ bool PathKernel::shade(PathState& path, const RayHit& query, PathSample& sample,
   }
   const uint32_t lobes = material.lobes;
   const Vec3 wo = hit.frame.toLocal(hit.wo);
-  const Bsdf bsdf = lobes == kLobeDiffuse ? Bsdf(baseColorAt(scene_, hit), wo) : Bsdf(surfaceAt(scene_, hit, lobes, indexOutside(path, hit)), wo);
+  const Bsdf bsdf = lobes == kLobeDiffuse ? Bsdf(baseColorAt(scene_, hit), wo)
+                                          : Bsdf(surfaceAt(scene_, hit, lobes, indexOutside(path, hit)), wo);
   const bool firstNonSpecular = wantFeatures_ && !path.featuresDone;
   if (firstNonSpecular) recordFeatures(path, hit, bsdf, sample);
   if (path.segments >= plan_.settings.maxDepth) return false;

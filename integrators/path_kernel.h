@@ -3,8 +3,9 @@
 //
 //   throughput · emission,   throughput = Π f(wo, wi) |cos| / pdf(wi),
 //
-// where the light at each vertex is found in two ways, by sampling a light and by the BSDF direction hitting one, weighted by the power
-// heuristic (Veach 1997). Other integrators follow the same conventions for hits, media, null interfaces and termination.
+// where the light at each vertex is found in two ways, by sampling a light and by the BSDF direction hitting one,
+// weighted by the power heuristic (Veach 1997). Other integrators follow the same conventions for hits, media, null
+// interfaces and termination.
 #pragma once
 
 #include "integrators/path_state.h"
@@ -36,15 +37,23 @@ class PathObserver {
   virtual void onLight(const ShadowRay& ray, bool visible) = 0;
 };
 
-// Traces many paths in step: all find their next surface, then all are shaded, then all shadow rays run. Shading one path does not wait for another's
-// memory or divisions, which a path followed alone would (1.4x the speed); the result of a path does not depend on its companions.
+// Traces many paths in step: all find their next surface, then all are shaded, then all shadow rays run. Shading one
+// path does not wait for another's memory or divisions, which a path followed alone would (1.4x the speed); the result
+// of a path does not depend on its companions.
 class PathKernel {
  public:
-  PathKernel(const TransportContext& context, const Plan& plan, const PassSampler& sampler, std::vector<RecordedRay>* record)
-      : context_(context), scene_(context.scene), plan_(plan), sampler_(sampler), record_(record), wantFeatures_(plan.features),
+  PathKernel(const TransportContext& context, const Plan& plan, const PassSampler& sampler,
+             std::vector<RecordedRay>* record)
+      : context_(context),
+        scene_(context.scene),
+        plan_(plan),
+        sampler_(sampler),
+        record_(record),
+        wantFeatures_(plan.features),
         filtered_(context.scene.accel().filtered()) {}
 
-  // Starts a path through pixel (x, y) of the full frame with the random numbers of `key`. At most kBatch before a run().
+  // Starts a path through pixel (x, y) of the full frame with the random numbers of `key`. At most kBatch before a
+  // run().
   void start(int x, int y, uint64_t key);
   // Follows all started paths to their ends; their samples are then in the order of start().
   void run();
@@ -68,7 +77,8 @@ class PathKernel {
   void addEmission(const PathState& path, const Hit& hit, PathSample& sample) const;
   void addUnlit(PathState& path, const Hit& hit, PathSample& sample) const;
   bool crossNullInterface(PathState& path, const Hit& hit) const;
-  bool sampleLight(const PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const SampleBlock& block, ShadowRay& shadow) const;
+  bool sampleLight(const PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const SampleBlock& block,
+                   ShadowRay& shadow) const;
   bool scatter(PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const SampleBlock& block) const;
   void recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsdf, PathSample& sample) const;
 
@@ -83,9 +93,9 @@ class PathKernel {
   int count_ = 0;
   std::array<PathState, kBatch> path_{};
   std::array<PathSample, kBatch> sample_{};
-  RayBatch rays_;                    // in the order of active_, like their hits
+  RayBatch rays_;  // in the order of active_, like their hits
   std::array<RayHit, kBatch> hit_;
-  std::array<int, kBatch> active_;   // indices of the paths that go on
+  std::array<int, kBatch> active_;  // indices of the paths that go on
   int activeCount_ = 0;
   ShadowBatch shadowRays_;
   std::array<ShadowRay, kBatch> shadow_;

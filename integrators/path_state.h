@@ -13,10 +13,10 @@ struct PathState {
   Vec3 origin, direction;
   Spectrum throughput{1};
   MediaStack media;
-  int segments = 0;      // traced so far, null interfaces not counted
-  int nullCrossings = 0; // bounds a path through degenerate nested surfaces
-  uint32_t salt = 0;     // of stochastic coverage, one per ray
-  uint64_t key = 0;      // of the path's random numbers
+  int segments = 0;       // traced so far, null interfaces not counted
+  int nullCrossings = 0;  // bounds a path through degenerate nested surfaces
+  uint32_t salt = 0;      // of stochastic coverage, one per ray
+  uint64_t key = 0;       // of the path's random numbers
 
   // The last vertex that scattered, for the weight of light found by the direction sampled there.
   Vec3 lastPosition{0}, lastNormal{0};

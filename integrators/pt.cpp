@@ -13,7 +13,9 @@ constexpr uint64_t kStream = 0x7074;
 class PathTracer final : public Integrator {
  public:
   const char* name() const override { return "pt"; }
-  const char* description() const override { return "path tracing, next-event estimation and BSDF sampling with the power heuristic"; }
+  const char* description() const override {
+    return "path tracing, next-event estimation and BSDF sampling with the power heuristic";
+  }
   Applies applies(const SceneTraits&) const override { return {true, "unbiased for every scene"}; }
 
   std::unique_ptr<PassSampler> pixelSampler(const Plan& plan, uint64_t pass) const override {
@@ -37,7 +39,8 @@ class PathTracer final : public Integrator {
         kernel.run();
         for (int i = first; i < last; ++i) storeSample(request, pixelX(i), pixelY(i), kernel.sample(i - first), target);
       }
-      return TileCounts{static_cast<uint64_t>(tile.width()) * static_cast<uint64_t>(tile.height()), kernel.rayCount, kernel.shadowRayCount};
+      return TileCounts{static_cast<uint64_t>(tile.width()) * static_cast<uint64_t>(tile.height()), kernel.rayCount,
+                        kernel.shadowRayCount};
     });
   }
 };

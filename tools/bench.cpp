@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// `braid bench`: throughput as ratios within one run. The rays that a render traced are recorded and traced again by bare Embree calls; the ratio of
-// the two rates, and the share of the render that Embree's part would take, mean the same on every machine.
+// `braid bench`: throughput as ratios within one run. The rays that a render traced are recorded and traced again by
+// bare Embree calls; the ratio of the two rates, and the share of the render that Embree's part would take, mean the
+// same on every machine.
 #include <algorithm>
 #include <chrono>
 #include <fstream>
@@ -63,8 +64,10 @@ void traceRaw(RTCScene scene, const RecordedRay& r) {
   query.ray.flags = 0;
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  if (r.shadow) rtcOccluded1(scene, &context, &query.ray);
-  else rtcIntersect1(scene, &context, &query);
+  if (r.shadow)
+    rtcOccluded1(scene, &context, &query.ray);
+  else
+    rtcIntersect1(scene, &context, &query);
 }
 
 // Traces the recorded rays as the renderer does: in packets of neighbours of one kind.
@@ -76,9 +79,12 @@ void traceLikeRenderer(const Accel& accel, const std::vector<RecordedRay>& rays)
   for (size_t i = 0; i < rays.size();) {
     const bool shadow = rays[i].shadow;
     int count = 0;
-    for (; count < kBatch && i < rays.size() && rays[i].shadow == shadow; ++count, ++i) shadow ? shadows.set(count, rays[i]) : batch.set(count, rays[i]);
-    if (shadow) accel.occluded(shadows, count, hidden.data());
-    else accel.intersect(batch, count, hits.data());
+    for (; count < kBatch && i < rays.size() && rays[i].shadow == shadow; ++count, ++i)
+      shadow ? shadows.set(count, rays[i]) : batch.set(count, rays[i]);
+    if (shadow)
+      accel.occluded(shadows, count, hidden.data());
+    else
+      accel.intersect(batch, count, hits.data());
   }
 }
 
@@ -165,7 +171,8 @@ nlohmann::json benchScene(const SceneSource& source, const BenchOptions& o, cons
           {"raysPerPath", static_cast<double>(rayCount) / pixels},
           {"loadSeconds", loadSeconds},
           {"hierarchySeconds", scene.buildTimes().hierarchy},
-          {"hierarchyBytesPerTriangle", static_cast<double>(scene.accel().bytes()) / std::max<double>(1, static_cast<double>(scene.traits().triangles))},
+          {"hierarchyBytesPerTriangle", static_cast<double>(scene.accel().bytes()) /
+                                            std::max<double>(1, static_cast<double>(scene.traits().triangles))},
           {"sceneBytesPerTriangle", sceneBytes / std::max<double>(1, static_cast<double>(scene.traits().triangles))},
           {"filmBytesPerPixel", plan.filmBytesPerPixel},
           {"lightBytes", context.lights.bytes()},
@@ -178,15 +185,19 @@ int runBench(const BenchOptions& o) {
   Settings settings = makeSettings(view, o.samples);
   settings.features = false;
   std::vector<SceneSource> sources;
-  const std::vector<SceneSource> builtin{{"builtin:cornell", [] { return cornellBox(); }}, {"builtin:million", [] { return cornellBox(1'000'000); }}};
+  const std::vector<SceneSource> builtin{{"builtin:cornell", [] { return cornellBox(); }},
+                                         {"builtin:million", [] { return cornellBox(1'000'000); }}};
   for (const std::string& file : o.scenes) {
-    const auto known = std::find_if(builtin.begin(), builtin.end(), [&](const SceneSource& b) { return b.name == file; });
-    if (known != builtin.end()) sources.push_back(*known);
-    else sources.push_back({file, [file] {
-                         SceneChoice choice;
-                         choice.file = file;
-                         return loadScene(choice);
-                            }});
+    const auto known =
+        std::find_if(builtin.begin(), builtin.end(), [&](const SceneSource& b) { return b.name == file; });
+    if (known != builtin.end())
+      sources.push_back(*known);
+    else
+      sources.push_back({file, [file] {
+                           SceneChoice choice;
+                           choice.file = file;
+                           return loadScene(choice);
+                         }});
   }
   if (sources.empty()) sources = builtin;
   nlohmann::json all = nlohmann::json::array();
@@ -194,17 +205,26 @@ int runBench(const BenchOptions& o) {
     const nlohmann::json r = benchScene(source, o, settings);
     all.push_back(r);
     if (o.json) continue;
-    fmt::print("{}: {} triangles, {:.2f} rays a path\n", source.name, r["triangles"].dump(), r["raysPerPath"].get<double>());
-    fmt::print("  {:.2f} M paths/s, {:.2f} M rays/s, {:.0f} % of the time inside Embree\n", r["pathsPerSecond"].get<double>() * 1e-6,
-               r["raysPerSecond"].get<double>() * 1e-6, 100 * r["embreeShare"].get<double>());
-    fmt::print("  the same rays one by one by Embree alone: {:.2f} M rays/s in the order of the render (ratio {:.3f}), {:.2f} M rays/s in random order (ratio {:.3f})\n",
-               r["rawRaysPerSecond"].get<double>() * 1e-6, r["ratio"].get<double>(), r["rawIncoherentRaysPerSecond"].get<double>() * 1e-6,
-               r["incoherentRatio"].get<double>());
-    fmt::print("  load {:.3f} s, hierarchies {:.3f} s, {:.1f} bytes a triangle in hierarchies, {:.1f} in all; film {} bytes a pixel; peak {:.0f} MiB\n",
-               r["loadSeconds"].get<double>(), r["hierarchySeconds"].get<double>(), r["hierarchyBytesPerTriangle"].get<double>(),
-               r["sceneBytesPerTriangle"].get<double>(), r["filmBytesPerPixel"].dump(), r["peakMemoryBytes"].get<double>() / 1048576.0);
+    fmt::print("{}: {} triangles, {:.2f} rays a path\n", source.name, r["triangles"].dump(),
+               r["raysPerPath"].get<double>());
+    fmt::print("  {:.2f} M paths/s, {:.2f} M rays/s, {:.0f} % of the time inside Embree\n",
+               r["pathsPerSecond"].get<double>() * 1e-6, r["raysPerSecond"].get<double>() * 1e-6,
+               100 * r["embreeShare"].get<double>());
+    fmt::print(
+        "  the same rays one by one by Embree alone: {:.2f} M rays/s in the order of the render (ratio {:.3f}), {:.2f} "
+        "M rays/s in random order (ratio {:.3f})\n",
+        r["rawRaysPerSecond"].get<double>() * 1e-6, r["ratio"].get<double>(),
+        r["rawIncoherentRaysPerSecond"].get<double>() * 1e-6, r["incoherentRatio"].get<double>());
+    fmt::print(
+        "  load {:.3f} s, hierarchies {:.3f} s, {:.1f} bytes a triangle in hierarchies, {:.1f} in all; film {} bytes a "
+        "pixel; peak {:.0f} MiB\n",
+        r["loadSeconds"].get<double>(), r["hierarchySeconds"].get<double>(),
+        r["hierarchyBytesPerTriangle"].get<double>(), r["sceneBytesPerTriangle"].get<double>(),
+        r["filmBytesPerPixel"].dump(), r["peakMemoryBytes"].get<double>() / 1048576.0);
   }
-  if (o.json) fmt::print("{}\n", nlohmann::json({{"schema", 1}, {"build", BRAID_BUILD_FLAGS}, {"isa", o.isa}, {"results", all}}).dump(2));
+  if (o.json)
+    fmt::print("{}\n",
+               nlohmann::json({{"schema", 1}, {"build", BRAID_BUILD_FLAGS}, {"isa", o.isa}, {"results", all}}).dump(2));
   return 0;
 }
 
@@ -215,11 +235,17 @@ void addBench(CLI::App& app, Action& action) {
   BenchOptions& o = *options;
   o.samples.maxDepth = 10;
   CLI::App* command = app.add_subcommand("bench", "Measure throughput against bare Embree rays in the same run");
-  command->footer("Example:\n  braid bench                 the built-in Cornell box and its million-triangle variant\n  braid bench scene.glb --json");
-  command->add_option("SCENE", o.scenes, "glTF files, builtin:cornell or builtin:million (default: both built-in ones)");
+  command->footer(
+      "Example:\n  braid bench                 the built-in Cornell box and its million-triangle variant\n  braid "
+      "bench scene.glb --json");
+  command->add_option("SCENE", o.scenes,
+                      "glTF files, builtin:cornell or builtin:million (default: both built-in ones)");
   command->add_option("--size", o.size, "Frame, WIDTHxHEIGHT")->capture_default_str();
-  command->add_option("--repeats", o.repeats, "Interleaved measurements; the median counts")->capture_default_str()->check(CLI::Range(1, 1000));
-  command->add_option("--isa", o.isa, "Instruction set for Embree: avx2, avx512, sse4.2, or auto")->capture_default_str();
+  command->add_option("--repeats", o.repeats, "Interleaved measurements; the median counts")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
+  command->add_option("--isa", o.isa, "Instruction set for Embree: avx2, avx512, sse4.2, or auto")
+      ->capture_default_str();
   command->add_flag("--json", o.json, "As JSON");
   addSampleOptions(*command, o.samples);
   command->callback([options, &action] { action = [options] { return runBench(*options); }; });

@@ -16,8 +16,8 @@ void addSphere(TriangleMesh& mesh, const Vec3& centre, float radius, int level);
 // Adds a mesh with one instance.
 void addMesh(SceneData& data, TriangleMesh mesh, uint32_t material);
 
-// The diffuse Cornell box, 2 m wide, with its camera; 38 triangles. The blocks are tessellated into about `blockTriangles` and rippled when that is over
-// 1000, which makes the million-triangle benchmark.
+// The diffuse Cornell box, 2 m wide, with its camera; 38 triangles. The blocks are tessellated into about
+// `blockTriangles` and rippled when that is over 1000, which makes the million-triangle benchmark.
 SceneData cornellBox(size_t blockTriangles = 0);
 
 // A closed sphere seen from inside with albedo a and emission e everywhere: radiance e / (1 - a) for every ray.

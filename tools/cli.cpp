@@ -26,11 +26,14 @@ std::vector<double> parseNumbers(const std::string& text, size_t count, const ch
     } catch (const std::exception&) {
       used = 0;
     }
-    if (used == 0 || used != item.size() || !std::isfinite(value)) numbers.assign(count + 1, 0.0);
-    else numbers.push_back(value);
+    if (used == 0 || used != item.size() || !std::isfinite(value))
+      numbers.assign(count + 1, 0.0);
+    else
+      numbers.push_back(value);
     begin = end + 1;
   }
-  if (numbers.size() != count) throw Error(ExitCode::Usage, fmt::format("{} '{}': expected {} numbers separated by commas", option, text, count));
+  if (numbers.size() != count)
+    throw Error(ExitCode::Usage, fmt::format("{} '{}': expected {} numbers separated by commas", option, text, count));
   return numbers;
 }
 
@@ -87,7 +90,8 @@ double parseDuration(const std::string& text) {
 void addSceneOptions(CLI::App& command, SceneChoice& c) {
   command.add_option("SCENE", c.file, "glTF 2.0 file, .gltf or .glb")->required();
   command.add_option("--size", c.size, "Full frame in pixels, WIDTHxHEIGHT")->capture_default_str();
-  command.add_option("--crop", c.crop, "Render only x0,y0,x1,y1 of the full frame (pixels, upper left origin, ends excluded)");
+  command.add_option("--crop", c.crop,
+                     "Render only x0,y0,x1,y1 of the full frame (pixels, upper left origin, ends excluded)");
   command.add_option("--camera", c.camera, "Camera by name or index (default: the first)");
   command.add_option("--look-at", c.lookAt, "Eye and target instead of the file's camera: ox,oy,oz,tx,ty,tz in metres");
   command.add_option("--yfov", c.yfovDegrees, "Vertical field of view in degrees");
@@ -97,12 +101,15 @@ void addSceneOptions(CLI::App& command, SceneChoice& c) {
   command.add_option("--env", c.environment, "Environment image, latitude-longitude (.hdr, .exr, ...)");
   command.add_option("--env-rotate", c.environmentRotation, "Turn the environment about +Y, degrees");
   command.add_option("--env-scale", c.environmentScale, "Multiply the environment")->capture_default_str();
-  command.add_option("--background", c.background, "Radiance r,g,b seen by camera rays that miss, instead of the environment");
-  command.add_option("--light-scale", c.lightScale, "Multiply every light and emitter of the file")->capture_default_str();
+  command.add_option("--background", c.background,
+                     "Radiance r,g,b seen by camera rays that miss, instead of the environment");
+  command.add_option("--light-scale", c.lightScale, "Multiply every light and emitter of the file")
+      ->capture_default_str();
   command.add_flag("--no-default-light", c.noDefaultLight, "No grey dome for a file without lights");
   command.add_flag("--double-sided", c.load.doubleSided, "Treat every material as double-sided");
   command.add_flag("--full", c.full, "Leave nothing out that the scene does not need (same pixels, for checking)");
-  command.add_option("--isa", c.isa, "Instruction set for Embree: avx2, avx512, sse4.2, or 'auto'")->capture_default_str();
+  command.add_option("--isa", c.isa, "Instruction set for Embree: avx2, avx512, sse4.2, or 'auto'")
+      ->capture_default_str();
   command.add_flag("-q,--quiet", c.quiet, "Errors only");
   command.add_flag("-v,--verbose", c.verbose, "Also print the plan");
 }
@@ -111,13 +118,16 @@ void addSampleOptions(CLI::App& command, SampleChoice& c) {
   command.add_option("--integrator", c.integrators, "Integrators, separated by commas, or auto")->capture_default_str();
   command.add_option("--spp", c.spp, "Samples per pixel of each integrator (default 64 unless --time is given)");
   command.add_option("--time", c.time, "Stop after this wall-clock time: 90, 90s, 2m, 1h");
-  command.add_option("--max-depth", c.maxDepth, "Longest path in segments, the camera's included")->capture_default_str()->check(CLI::Range(1, 1000000));
+  command.add_option("--max-depth", c.maxDepth, "Longest path in segments, the camera's included")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000));
   command.add_option("--seed", c.seed, "Seed of the random numbers")->capture_default_str();
   command.add_option("--sampler", c.sampler, "sobol or independent")->capture_default_str();
   command.add_option("--filter", c.filter, "Pixel filter: box, gaussian or blackman-harris")->capture_default_str();
   command.add_option("--lights", c.lights, "How lights are chosen: auto, power or hierarchy")->capture_default_str();
   command.add_option("--threads", c.threads, "Worker threads (default: all)")->check(CLI::Range(0, 4096));
-  command.add_option("--clamp", c.clamp, "Clamp a path's radiance (biased; off by default)")->check(CLI::NonNegativeNumber);
+  command.add_option("--clamp", c.clamp, "Clamp a path's radiance (biased; off by default)")
+      ->check(CLI::NonNegativeNumber);
 }
 
 SceneData loadScene(const SceneChoice& c, LoadTimes* times) {
@@ -167,7 +177,9 @@ CameraData chooseCamera(const SceneData& data, const SceneChoice& c) {
       camera = data.cameras[i];
       found = true;
     }
-    if (!found) throw Error(ExitCode::Usage, fmt::format("no camera '{}' in {}: it has {}", c.camera, c.file, known.empty() ? "none" : known));
+    if (!found)
+      throw Error(ExitCode::Usage,
+                  fmt::format("no camera '{}' in {}: it has {}", c.camera, c.file, known.empty() ? "none" : known));
   }
   if (!c.lookAt.empty()) {
     const std::vector<double> n = parseNumbers(c.lookAt, 6, "--look-at");
@@ -191,7 +203,8 @@ Settings makeSettings(const SceneChoice& scene, const SampleChoice& samples) {
   std::tie(s.width, s.height) = parseSize(scene.size);
   if (!scene.crop.empty()) {
     const std::vector<double> n = parseNumbers(scene.crop, 4, "--crop");
-    s.crop = PixelWindow{static_cast<int>(n[0]), static_cast<int>(n[1]), static_cast<int>(n[2]), static_cast<int>(n[3])};
+    s.crop =
+        PixelWindow{static_cast<int>(n[0]), static_cast<int>(n[1]), static_cast<int>(n[2]), static_cast<int>(n[3])};
   }
   if (!scene.background.empty()) {
     const std::vector<double> n = parseNumbers(scene.background, 3, "--background");
@@ -203,10 +216,15 @@ Settings makeSettings(const SceneChoice& scene, const SampleChoice& samples) {
   s.spp = samples.spp > 0 ? samples.spp : samples.time.empty() ? 64 : 0;
   s.maxDepth = samples.maxDepth;
   s.seed = samples.seed;
-  s.sampler = choose<SamplerKind>(samples.sampler, "sampler", {{"sobol", SamplerKind::Sobol}, {"independent", SamplerKind::Independent}});
-  s.filter = choose<PixelFilter>(samples.filter, "filter", {{"box", PixelFilter::Box}, {"gaussian", PixelFilter::Gaussian}, {"blackman-harris", PixelFilter::BlackmanHarris}});
-  s.lightStrategy = choose<LightStrategy>(samples.lights, "light strategy",
-                                          {{"auto", LightStrategy::Automatic}, {"power", LightStrategy::Power}, {"hierarchy", LightStrategy::Hierarchy}});
+  s.sampler = choose<SamplerKind>(samples.sampler, "sampler",
+                                  {{"sobol", SamplerKind::Sobol}, {"independent", SamplerKind::Independent}});
+  s.filter = choose<PixelFilter>(samples.filter, "filter",
+                                 {{"box", PixelFilter::Box},
+                                  {"gaussian", PixelFilter::Gaussian},
+                                  {"blackman-harris", PixelFilter::BlackmanHarris}});
+  s.lightStrategy = choose<LightStrategy>(
+      samples.lights, "light strategy",
+      {{"auto", LightStrategy::Automatic}, {"power", LightStrategy::Power}, {"hierarchy", LightStrategy::Hierarchy}});
   s.threads = samples.threads;
   s.clamp = static_cast<float>(samples.clamp);
   return s;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the subcommands share: options that choose a scene and a view, loading with its warnings, and parsing of durations and sizes.
+// What the subcommands share: options that choose a scene and a view, loading with its warnings, and parsing of
+// durations and sizes.
 #pragma once
 
 #include <functional>
@@ -34,8 +35,8 @@ struct SceneChoice {
   LoadOptions load;
   std::string size = "1280x720";
   std::string crop;
-  std::string camera;         // name or index
-  std::string lookAt;         // ox,oy,oz,tx,ty,tz
+  std::string camera;  // name or index
+  std::string lookAt;  // ox,oy,oz,tx,ty,tz
   double yfovDegrees = 0;
   std::string environment;
   double environmentRotation = 0;  // degrees
@@ -70,7 +71,8 @@ struct SampleChoice {
 };
 void addSampleOptions(CLI::App& command, SampleChoice& choice);
 
-// Loads the file with everything the choice changes in it (environment, light scale); warnings go to standard error unless quiet.
+// Loads the file with everything the choice changes in it (environment, light scale); warnings go to standard error
+// unless quiet.
 SceneData loadScene(const SceneChoice& choice, LoadTimes* times = nullptr);
 std::unique_ptr<Scene> buildScene(SceneData data, const SceneChoice& choice);
 // The camera that the choice names. Throws Error(Usage) listing the cameras when there is none of that name.

@@ -46,7 +46,8 @@ Attribute matrix(const std::string& name, const Mat4& m) {
 
 }  // namespace
 
-std::vector<Attribute> headerAttributes(const Scene& scene, const Session& session, const RenderResult& result, const std::string& isa, bool timing) {
+std::vector<Attribute> headerAttributes(const Scene& scene, const Session& session, const RenderResult& result,
+                                        const std::string& isa, bool timing) {
   const Plan& plan = session.plan();
   const Settings& s = plan.settings;
   std::vector<Attribute> list{
@@ -62,7 +63,9 @@ std::vector<Attribute> headerAttributes(const Scene& scene, const Session& sessi
       text("braid/sampler", s.sampler == SamplerKind::Sobol ? "sobol" : "independent"),
       text("braid/filter", toString(s.filter)),
       integer("braid/maxDepth", static_cast<uint64_t>(s.maxDepth)),
-      text("braid/varianceIs", s.sampler == SamplerKind::Sobol ? "variance of the mean, rescaled from independent buckets" : "variance of the mean"),
+      text("braid/varianceIs", s.sampler == SamplerKind::Sobol
+                                   ? "variance of the mean, rescaled from independent buckets"
+                                   : "variance of the mean"),
       integer("samplesPerPixel", result.estimates->estimates.front().passes),
       integer("braid/rejectedSamples", result.rejected),
       matrix("worldToCamera", plan.camera.worldToCamera()),

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The EXR header of a render: everything needed to know what an image is, and nothing that changes between identical runs unless asked.
+// The EXR header of a render: everything needed to know what an image is, and nothing that changes between identical
+// runs unless asked.
 #pragma once
 
 #include <string>
@@ -11,6 +12,7 @@
 namespace braid {
 
 // `timing`: also seconds, which differ between runs.
-std::vector<Attribute> headerAttributes(const Scene& scene, const Session& session, const RenderResult& result, const std::string& isa, bool timing);
+std::vector<Attribute> headerAttributes(const Scene& scene, const Session& session, const RenderResult& result,
+                                        const std::string& isa, bool timing);
 
 }  // namespace braid

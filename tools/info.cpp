@@ -23,9 +23,13 @@ nlohmann::json describe(const Scene& scene) {
   const SceneData& data = scene.data();
   const SceneTraits& t = scene.traits();
   nlohmann::json cameras = nlohmann::json::array(), lights = nlohmann::json::array();
-  for (const CameraData& c : data.cameras) cameras.push_back({{"name", c.name}, {"type", c.orthographic ? "orthographic" : "perspective"}});
+  for (const CameraData& c : data.cameras)
+    cameras.push_back({{"name", c.name}, {"type", c.orthographic ? "orthographic" : "perspective"}});
   for (const PunctualLight& l : data.lights)
-    lights.push_back({{"name", l.name}, {"type", l.kind == PunctualKind::Point ? "point" : l.kind == PunctualKind::Spot ? "spot" : "directional"}});
+    lights.push_back({{"name", l.name},
+                      {"type", l.kind == PunctualKind::Point  ? "point"
+                               : l.kind == PunctualKind::Spot ? "spot"
+                                                              : "directional"}});
   // An emitter, for people, is an emissive material in use.
   std::set<uint32_t> emitters;
   for (const EmissiveTriangle& e : scene.emitters()) emitters.insert(data.meshes[e.mesh].material);
@@ -37,7 +41,9 @@ nlohmann::json describe(const Scene& scene) {
           {"instancedTriangles", t.instancedTriangles},
           {"meshes", t.meshes},
           {"instances", t.instances},
-          {"bounds", {{"min", empty ? nlohmann::json() : toJson(scene.bounds().lo)}, {"max", empty ? nlohmann::json() : toJson(scene.bounds().hi)}}},
+          {"bounds",
+           {{"min", empty ? nlohmann::json() : toJson(scene.bounds().lo)},
+            {"max", empty ? nlohmann::json() : toJson(scene.bounds().hi)}}},
           {"cameras", data.defaultCamera ? nlohmann::json::array() : cameras},
           {"lights", lights},
           {"emitters", emitters.size()},
@@ -56,12 +62,13 @@ nlohmann::json describe(const Scene& scene) {
 void print(const nlohmann::json& j) {
   const auto list = [](const nlohmann::json& items) {
     std::string text;
-    for (const auto& i : items) text += fmt::format("{}{}", text.empty() ? "" : ", ", (i.is_string() ? i : i["type"]).get<std::string>());
+    for (const auto& i : items)
+      text += fmt::format("{}{}", text.empty() ? "" : ", ", (i.is_string() ? i : i["type"]).get<std::string>());
     return text.empty() ? std::string("none") : text;
   };
   fmt::print("{}\n", j["file"].get<std::string>());
-  fmt::print("  triangles   {} ({} instanced) in {} meshes, {} instances\n", j["triangles"].dump(), j["instancedTriangles"].dump(), j["meshes"].dump(),
-             j["instances"].dump());
+  fmt::print("  triangles   {} ({} instanced) in {} meshes, {} instances\n", j["triangles"].dump(),
+             j["instancedTriangles"].dump(), j["meshes"].dump(), j["instances"].dump());
   fmt::print("  bounds      {} to {} metres\n", j["bounds"]["min"].dump(), j["bounds"]["max"].dump());
   fmt::print("  cameras     {}\n  lights      {}\n", list(j["cameras"]), list(j["lights"]));
   fmt::print("  emitters    {} materials, {} triangles\n", j["emitters"].dump(), j["emissiveTriangles"].dump());
@@ -75,8 +82,10 @@ int runInfo(InfoOptions o) {
   o.scene.quiet = o.scene.quiet || o.json;  // warnings are in the record
   const std::unique_ptr<Scene> scene = buildScene(loadScene(o.scene), o.scene);
   const nlohmann::json record = describe(*scene);
-  if (o.json) fmt::print("{}\n", record.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
-  else print(record);
+  if (o.json)
+    fmt::print("{}\n", record.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  else
+    print(record);
   return 0;
 }
 

@@ -27,19 +27,24 @@ int runPlan(const PlanOptions& o) {
   const size_t memory[] = {scene->accel().bytes(), scene->geometryBytes(), scene->textureBytes()};
   if (!o.json) {
     fmt::print("{}", plan.text());
-    fmt::print("memory: {:.1f} MiB hierarchies, {:.1f} MiB geometry, {:.1f} MiB textures\n", static_cast<double>(memory[0]) / 1048576.0,
-               static_cast<double>(memory[1]) / 1048576.0, static_cast<double>(memory[2]) / 1048576.0);
+    fmt::print("memory: {:.1f} MiB hierarchies, {:.1f} MiB geometry, {:.1f} MiB textures\n",
+               static_cast<double>(memory[0]) / 1048576.0, static_cast<double>(memory[1]) / 1048576.0,
+               static_cast<double>(memory[2]) / 1048576.0);
     return 0;
   }
   nlohmann::json lines = nlohmann::json::array();
-  for (const PlanLine& line : plan.lines) lines.push_back({{"kept", line.kept}, {"subject", line.subject}, {"reason", line.reason}});
+  for (const PlanLine& line : plan.lines)
+    lines.push_back({{"kept", line.kept}, {"subject", line.subject}, {"reason", line.reason}});
   const nlohmann::json record = {{"schema", 1},
                                  {"scene", o.scene.file},
                                  {"traits", scene->traits().names()},
                                  {"plan", lines},
                                  {"hash", hexString(plan.hash())},
-                                 {"memoryBytes", {{"hierarchies", memory[0]}, {"geometry", memory[1]}, {"textures", memory[2]},
-                                                  {"filmPerPixel", plan.filmBytesPerPixel}}}};
+                                 {"memoryBytes",
+                                  {{"hierarchies", memory[0]},
+                                   {"geometry", memory[1]},
+                                   {"textures", memory[2]},
+                                   {"filmPerPixel", plan.filmBytesPerPixel}}}};
   fmt::print("{}\n", record.dump(2));
   return 0;
 }

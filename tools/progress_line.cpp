@@ -21,7 +21,8 @@ std::string formatSeconds(double s) {
   return fmt::format("{}h{:02}m", whole / 3600, whole / 60 % 60);
 }
 
-ProgressLine::ProgressLine(bool quiet) : quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0), interval_(terminal_ ? 0.25 : 5.0) {}
+ProgressLine::ProgressLine(bool quiet)
+    : quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0), interval_(terminal_ ? 0.25 : 5.0) {}
 
 void ProgressLine::update(const Progress& p) {
   const bool last = p.rounds > 0 && p.round == p.rounds;
@@ -30,7 +31,8 @@ void ProgressLine::update(const Progress& p) {
   // A log of an hour's render should not have thousands of lines.
   if (!terminal_) interval_ = std::min(60.0, interval_ * 1.3);
   const std::string total = p.rounds > 0 ? fmt::format("/{}", p.rounds) : "";
-  std::string text = fmt::format("{}{} spp  {}  ETA {}", p.round, total, formatSeconds(p.seconds), formatSeconds(p.secondsLeft));
+  std::string text =
+      fmt::format("{}{} spp  {}  ETA {}", p.round, total, formatSeconds(p.seconds), formatSeconds(p.secondsLeft));
   if (p.rejected > 0) text += fmt::format("  {} samples rejected", p.rejected);
   if (!terminal_) {
     fmt::print(stderr, "rendering: {}\n", text);
@@ -38,11 +40,13 @@ void ProgressLine::update(const Progress& p) {
   }
   winsize size{};
   const int columns = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
-  const double done = p.rounds > 0 ? static_cast<double>(p.round) / static_cast<double>(p.rounds)
-                                   : p.secondsLeft >= 0 ? p.seconds / std::max(1e-9, p.seconds + p.secondsLeft) : 0;
+  const double done = p.rounds > 0         ? static_cast<double>(p.round) / static_cast<double>(p.rounds)
+                      : p.secondsLeft >= 0 ? p.seconds / std::max(1e-9, p.seconds + p.secondsLeft)
+                                           : 0;
   const int width = std::max(0, columns - static_cast<int>(text.size()) - 6);
   const int filled = static_cast<int>(done * width);
-  fmt::print(stderr, "\r[{}{}] {}\x1b[K", std::string(static_cast<size_t>(filled), '='), std::string(static_cast<size_t>(width - filled), ' '), text);
+  fmt::print(stderr, "\r[{}{}] {}\x1b[K", std::string(static_cast<size_t>(filled), '='),
+             std::string(static_cast<size_t>(width - filled), ' '), text);
   std::fflush(stderr);
 }
 
@@ -53,7 +57,8 @@ void ProgressLine::finish() {
 JsonLog::JsonLog(const std::string& path) {
   if (path.empty()) return;
   file_ = path == "-" ? stdout : std::fopen(path.c_str(), "w");
-  if (!file_) throw Error(ExitCode::OutputFailed, fmt::format("{}: cannot write the log: {}", path, std::strerror(errno)));
+  if (!file_)
+    throw Error(ExitCode::OutputFailed, fmt::format("{}: cannot write the log: {}", path, std::strerror(errno)));
 }
 
 JsonLog::~JsonLog() {

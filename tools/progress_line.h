@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Progress on standard error: one line rewritten on a terminal, a plain line now and then elsewhere, and JSON records for machines.
+// Progress on standard error: one line rewritten on a terminal, a plain line now and then elsewhere, and JSON records
+// for machines.
 #pragma once
 
 #include <cstdio>

@@ -41,21 +41,28 @@ void checkWritable(const std::string& path) {
   const std::string name = folder.empty() ? "." : folder.string();
   std::error_code ignored;
   if (!std::filesystem::is_directory(name, ignored))
-    throw Error(ExitCode::OutputFailed, fmt::format("{}: the folder {} does not exist: create it or choose another output", path, name));
+    throw Error(ExitCode::OutputFailed,
+                fmt::format("{}: the folder {} does not exist: create it or choose another output", path, name));
   if (access(name.c_str(), W_OK) != 0)
-    throw Error(ExitCode::OutputFailed, fmt::format("{}: the folder {} is not writable: {}", path, name, std::strerror(errno)));
+    throw Error(ExitCode::OutputFailed,
+                fmt::format("{}: the folder {} is not writable: {}", path, name, std::strerror(errno)));
   if (std::filesystem::is_directory(path, ignored))
     throw Error(ExitCode::OutputFailed, fmt::format("{}: is a folder: give a file name", path));
 }
 
-nlohmann::json resultRecord(const RenderResult& r, const RenderOptions& o, double loadSeconds, const Scene& scene, double writeSeconds) {
+nlohmann::json resultRecord(const RenderResult& r, const RenderOptions& o, double loadSeconds, const Scene& scene,
+                            double writeSeconds) {
   nlohmann::json outputs = nlohmann::json::array({o.output});
   if (!o.png.empty()) outputs.push_back(o.png);
   return {{"status", r.reason == StopReason::Cancelled ? "interrupted" : "done"},
           {"reason", toString(r.reason)},
           {"spp", r.estimates->estimates.front().passes},
-          {"seconds", {{"load", loadSeconds}, {"prepare", scene.buildTimes().prepare}, {"hierarchy", scene.buildTimes().hierarchy},
-                       {"render", r.seconds}, {"write", writeSeconds}}},
+          {"seconds",
+           {{"load", loadSeconds},
+            {"prepare", scene.buildTimes().prepare},
+            {"hierarchy", scene.buildTimes().hierarchy},
+            {"render", r.seconds},
+            {"write", writeSeconds}}},
           {"paths", r.paths},
           {"rays", r.rays + r.shadowRays},
           {"rejectedSamples", r.rejected},
@@ -106,13 +113,17 @@ int runRender(const RenderOptions& o) {
 
   if (!o.scene.quiet) {
     if (report.clampedToHalf > 0)
-      fmt::print(stderr, "warning: {}: {} headline values above 65504 were clamped to fit half floats: use --float\n", o.output, report.clampedToHalf);
-    if (result.rejected > 0) fmt::print(stderr, "warning: {} non-finite or negative samples counted as 0\n", result.rejected);
+      fmt::print(stderr, "warning: {}: {} headline values above 65504 were clamped to fit half floats: use --float\n",
+                 o.output, report.clampedToHalf);
+    if (result.rejected > 0)
+      fmt::print(stderr, "warning: {} non-finite or negative samples counted as 0\n", result.rejected);
     if (result.firstRejected)
-      fmt::print(stderr, "one of them: braid replay {} --integrator {} --pass {} --pixel {},{} --size {} --seed {}\n", o.scene.file, result.firstRejected->integrator,
-                 result.firstRejected->pass, result.firstRejected->x, result.firstRejected->y, o.scene.size, o.samples.seed);
-    fmt::print(stderr, "{} spp in {} ({:.2f} M paths/s, {:.1f} M rays/s), stopped by {}\n", result.estimates->estimates.front().passes,
-               formatSeconds(result.seconds), static_cast<double>(result.paths) / result.seconds * 1e-6,
+      fmt::print(stderr, "one of them: braid replay {} --integrator {} --pass {} --pixel {},{} --size {} --seed {}\n",
+                 o.scene.file, result.firstRejected->integrator, result.firstRejected->pass, result.firstRejected->x,
+                 result.firstRejected->y, o.scene.size, o.samples.seed);
+    fmt::print(stderr, "{} spp in {} ({:.2f} M paths/s, {:.1f} M rays/s), stopped by {}\n",
+               result.estimates->estimates.front().passes, formatSeconds(result.seconds),
+               static_cast<double>(result.paths) / result.seconds * 1e-6,
                static_cast<double>(result.rays + result.shadowRays) / result.seconds * 1e-6, toString(result.reason));
     fmt::print(stderr, "Saved: {}\n", o.output);
     if (!o.png.empty()) fmt::print(stderr, "Saved: {}\n", o.png);
@@ -127,7 +138,9 @@ void addRender(CLI::App& app, Action& action) {
   auto options = std::make_shared<RenderOptions>();
   RenderOptions& o = *options;
   CLI::App* command = app.add_subcommand("render", "Render a scene to an EXR image");
-  command->footer("Examples:\n  braid render scene.glb -o out.exr --spp 256\n  braid render scene.glb -o out.exr --time 2m --env sky.hdr --png out.png");
+  command->footer(
+      "Examples:\n  braid render scene.glb -o out.exr --spp 256\n  braid render scene.glb -o out.exr --time 2m --env "
+      "sky.hdr --png out.png");
   addSceneOptions(*command, o.scene);
   addSampleOptions(*command, o.samples);
   command->add_option("-o,--output", o.output, "EXR file to write")->required();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `braid replay`: follows one camera path and prints what happens at every vertex. A pass is a pure function of the scene, the seed and its index, so any
-// sample of any render can be looked at again.
+// `braid replay`: follows one camera path and prints what happens at every vertex. A pass is a pure function of the
+// scene, the seed and its index, so any sample of any render can be looked at again.
 #include <fmt/format.h>
 
 #include "integrators/path_kernel.h"
@@ -25,15 +25,18 @@ class PrintingObserver final : public PathObserver {
  public:
   explicit PrintingObserver(const Scene& scene) : scene_(scene) {}
   void onRay(const PathState& path) override {
-    fmt::print("{}: ray from {} along {}, throughput {}\n", path.segments, show(path.origin), show(path.direction), show(path.throughput));
+    fmt::print("{}: ray from {} along {}, throughput {}\n", path.segments, show(path.origin), show(path.direction),
+               show(path.throughput));
   }
   void onMiss() override { fmt::print("   leaves the scene\n"); }
   void onHit(const Hit& hit) override {
-    fmt::print("   hits mesh {} '{}', triangle {}, material '{}' at {}, {:.6g} m away, {} side, shading normal {}\n", hit.meshIndex, hit.mesh->name, hit.triangle,
-               hit.material->name, show(hit.position), hit.distance, hit.front ? "front" : "back", show(hit.frame.n));
+    fmt::print("   hits mesh {} '{}', triangle {}, material '{}' at {}, {:.6g} m away, {} side, shading normal {}\n",
+               hit.meshIndex, hit.mesh->name, hit.triangle, hit.material->name, show(hit.position), hit.distance,
+               hit.front ? "front" : "back", show(hit.frame.n));
   }
   void onLight(const ShadowRay& ray, bool visible) override {
-    fmt::print("   light sample along {}: {} {}\n", show(ray.ray.direction), visible ? "adds" : "hidden, would add", show(ray.contribution));
+    fmt::print("   light sample along {}: {} {}\n", show(ray.ray.direction), visible ? "adds" : "hidden, would add",
+               show(ray.contribution));
   }
 
  private:
@@ -44,8 +47,10 @@ int runReplay(const ReplayOptions& o) {
   const Settings settings = makeSettings(o.scene, o.samples);
   int x = 0, y = 0;
   char rest = 0;
-  if (std::sscanf(o.pixel.c_str(), "%d,%d%c", &x, &y, &rest) != 2 || x < 0 || y < 0 || x >= settings.width || y >= settings.height)
-    throw Error(ExitCode::Usage, fmt::format("--pixel '{}': expected X,Y inside the {}x{} frame", o.pixel, settings.width, settings.height));
+  if (std::sscanf(o.pixel.c_str(), "%d,%d%c", &x, &y, &rest) != 2 || x < 0 || y < 0 || x >= settings.width ||
+      y >= settings.height)
+    throw Error(ExitCode::Usage, fmt::format("--pixel '{}': expected X,Y inside the {}x{} frame", o.pixel,
+                                             settings.width, settings.height));
   SceneData data = loadScene(o.scene);
   const CameraData camera = chooseCamera(data, o.scene);
   const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene);
@@ -54,7 +59,8 @@ int runReplay(const ReplayOptions& o) {
   const TransportContext context(*scene, settings.lightStrategy);
   const Integrator& integrator = *plan.integrators.front().integrator;
   const auto sampler = integrator.pixelSampler(plan, o.pass);
-  if (!sampler) throw Error(ExitCode::Usage, fmt::format("integrator '{}' has no camera paths to replay", integrator.name()));
+  if (!sampler)
+    throw Error(ExitCode::Usage, fmt::format("integrator '{}' has no camera paths to replay", integrator.name()));
 
   PrintingObserver observer(*scene);
   PathKernel kernel(context, plan, *sampler, nullptr);

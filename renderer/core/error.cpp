@@ -25,7 +25,8 @@ SceneError::SceneError(ExitCode code, std::string file, std::string place, std::
     : SceneError(code, std::move(file), std::vector<Problem>{{std::move(place), std::move(text)}}) {}
 
 void assertionFailed(const char* condition, const char* file, int line) {
-  throw Error(ExitCode::Internal, std::string(file) + ":" + std::to_string(line) + ": internal error: " + condition + " does not hold");
+  throw Error(ExitCode::Internal,
+              std::string(file) + ":" + std::to_string(line) + ": internal error: " + condition + " does not hold");
 }
 
 }  // namespace braid

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Three kinds of error: BRAID_ASSERT = our bug; an Error exception = bad input or a resource that failed; optional = an expected miss.
+// Three kinds of error: BRAID_ASSERT = our bug; an Error exception = bad input or a resource that failed; optional = an
+// expected miss.
 #pragma once
 
 #include <stdexcept>

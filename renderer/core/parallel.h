@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parallel loops over fixed chunks: what a chunk holds never depends on the number of threads, so results do not either.
+// Parallel loops over fixed chunks: what a chunk holds never depends on the number of threads, so results do not
+// either.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +29,8 @@ template <class T, class Map>
 T parallelSum(size_t count, size_t chunk, T zero, const Map& map) {
   const size_t chunks = (count + chunk - 1) / chunk;
   std::vector<T> partial(chunks, zero);
-  tbb::parallel_for(size_t(0), chunks, [&](size_t c) { partial[c] = map(c * chunk, std::min(count, (c + 1) * chunk)); });
+  tbb::parallel_for(size_t(0), chunks,
+                    [&](size_t c) { partial[c] = map(c * chunk, std::min(count, (c + 1) * chunk)); });
   T total = zero;
   for (const T& p : partial) total += p;
   return total;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Image planes: contiguous row-major storage, one plane a channel, so that statistics vectorise and EXR gets what it wants.
+// Image planes: contiguous row-major storage, one plane a channel, so that statistics vectorise and EXR gets what it
+// wants.
 #pragma once
 
 #include <array>
@@ -16,11 +17,14 @@ struct Plane {
   std::vector<T> data;
 
   Plane() = default;
-  Plane(int w, int h, T value = T{}) : width(w), height(h), data(static_cast<size_t>(w) * static_cast<size_t>(h), value) {}
+  Plane(int w, int h, T value = T{})
+      : width(w), height(h), data(static_cast<size_t>(w) * static_cast<size_t>(h), value) {}
 
   size_t size() const { return data.size(); }
   bool empty() const { return data.empty(); }
-  size_t index(int x, int y) const { return static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x); }
+  size_t index(int x, int y) const {
+    return static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
+  }
   T& at(int x, int y) { return data[index(x, y)]; }
   const T& at(int x, int y) const { return data[index(x, y)]; }
   T& operator[](size_t i) { return data[i]; }
@@ -42,7 +46,8 @@ struct Rgb {
   Plane<T>& operator[](size_t c) { return channel[c]; }
   const Plane<T>& operator[](size_t c) const { return channel[c]; }
   Vec3 pixel(size_t i) const {
-    return Vec3(static_cast<float>(channel[0][i]), static_cast<float>(channel[1][i]), static_cast<float>(channel[2][i]));
+    return Vec3(static_cast<float>(channel[0][i]), static_cast<float>(channel[1][i]),
+                static_cast<float>(channel[2][i]));
   }
   void set(size_t i, const Vec3& v) {
     channel[0][i] = static_cast<T>(v.x);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sobol' points with hash-based Owen scrambling (Laine and Karras 2011, Burley 2020, with the hash constants found by Vegdahl 2021), and
-// a counter-based independent generator. Direction numbers: Joe and Kuo 2008, from Boost.Random's table.
+// Sobol' points with hash-based Owen scrambling (Laine and Karras 2011, Burley 2020, with the hash constants found by
+// Vegdahl 2021), and a counter-based independent generator. Direction numbers: Joe and Kuo 2008, from Boost.Random's
+// table.
 #include "renderer/core/sampler.h"
 
 #include <boost/random/sobol.hpp>
@@ -19,8 +20,8 @@ constexpr uint32_t reverseBits(uint32_t x) {
 
 float toUnit(uint32_t x) { return static_cast<float>(x >> 8) * 0x1p-24f; }
 
-// One Sobol' coordinate: dimension d, point i. The initial numbers m are extended by the recurrence of the dimension's primitive
-// polynomial (Joe and Kuo 2008, Eq. 2).
+// One Sobol' coordinate: dimension d, point i. The initial numbers m are extended by the recurrence of the dimension's
+// primitive polynomial (Joe and Kuo 2008, Eq. 2).
 uint32_t sobolCoordinate(unsigned d, uint32_t i) {
   using Table = boost::random::default_sobol_table;
   std::array<uint32_t, 32> v{};
@@ -43,11 +44,12 @@ uint32_t sobolCoordinate(unsigned d, uint32_t i) {
   return x;
 }
 
-// The low coordinates of a Sobol' sequence are the best ones: the pixel position gets the first two, then every block its seven used slots,
-// directions before choices; what no one reads comes last. Returns the coordinate of each structural dimension.
+// The low coordinates of a Sobol' sequence are the best ones: the pixel position gets the first two, then every block
+// its seven used slots, directions before choices; what no one reads comes last. Returns the coordinate of each
+// structural dimension.
 std::vector<unsigned> dimensionOrder(unsigned blocks) {
   static constexpr unsigned kCamera[] = {slot::kPixelX, slot::kPixelY};
-  static constexpr unsigned kVertex[] = {slot::kLightU, slot::kLightV,      slot::kBsdfU, slot::kBsdfV,
+  static constexpr unsigned kVertex[] = {slot::kLightU, slot::kLightV,      slot::kBsdfU,   slot::kBsdfV,
                                          slot::kLobe,   slot::kLightSelect, slot::kRoulette};
   std::vector<unsigned> order(size_t(blocks) * kBlockSize, ~0u);
   unsigned next = 0;
@@ -62,7 +64,8 @@ std::vector<unsigned> dimensionOrder(unsigned blocks) {
 }  // namespace
 
 PassSampler::PassSampler(SamplerKind kind, uint64_t seed, uint64_t stream, uint64_t pass, unsigned blocks)
-    : key_(hashCombine(hashCombine(mix64(seed + 1), stream), kind == SamplerKind::Sobol ? pass % kSequenceBuckets : pass)) {
+    : key_(hashCombine(hashCombine(mix64(seed + 1), stream),
+                       kind == SamplerKind::Sobol ? pass % kSequenceBuckets : pass)) {
   if (kind == SamplerKind::Independent) return;
   index_ = static_cast<uint32_t>(pass / kSequenceBuckets);
   points_.resize(size_t(blocks) * kBlockSize);
@@ -89,7 +92,8 @@ SampleBlock PassSampler::block(uint64_t itemKey, unsigned b) const {
       x[i] = reverseBits(r);
     }
   } else {
-    // Past the table (or independent): the point index must be in the key, since the item key is shared by the passes of a bucket.
+    // Past the table (or independent): the point index must be in the key, since the item key is shared by the passes
+    // of a bucket.
     for (unsigned i = 0; i < kBlockSize; ++i) {
       const uint32_t dimension = static_cast<uint32_t>(first) + i;
       x[i] = mix32(mix32(lo + dimension * 0x9e3779b9u) ^ hi ^ (index_ * 0x85ebca6bu));

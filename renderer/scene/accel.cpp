@@ -86,7 +86,8 @@ void Accel::checkError(const char* doing) const {
   const RTCError error = rtcGetDeviceError(device_);
   if (error == RTC_ERROR_NONE) return;
   if (error == RTC_ERROR_OUT_OF_MEMORY)
-    throw Error(ExitCode::OutOfMemory, std::string("out of memory while ") + doing + ": reduce the scene or give the machine more memory");
+    throw Error(ExitCode::OutOfMemory,
+                std::string("out of memory while ") + doing + ": reduce the scene or give the machine more memory");
   throw Error(ExitCode::Internal, std::string("Embree error ") + std::to_string(error) + " while " + doing);
 }
 
@@ -101,8 +102,10 @@ void Accel::attachMesh(RTCScene scene, uint32_t meshIndex, const AccelInput& inp
   const TriangleMesh& mesh = (*input.meshes)[meshIndex];
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
   rtcSetGeometryBuildQuality(geometry, highQuality_ ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.positions.data(), 0, sizeof(Vec3), mesh.positions.size());
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0, sizeof(glm::uvec3), mesh.triangles.size());
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.positions.data(), 0,
+                             sizeof(Vec3), mesh.positions.size());
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
+                             sizeof(glm::uvec3), mesh.triangles.size());
   if (filter_ && (*input.filtered)[meshIndex]) {
     filterData_.push_back(std::make_unique<FilterData>(FilterData{filter_, meshIndex}));
     rtcSetGeometryUserData(geometry, filterData_.back().get());
@@ -224,10 +227,12 @@ void Accel::filterCallback(const RTCFilterFunctionNArguments* args) {
   const auto* data = static_cast<const FilterData*>(args->geometryUserPtr);
   for (unsigned i = 0; i < args->N; ++i) {
     if (args->valid[i] != -1) continue;
-    const Vec3 direction(RTCRayN_dir_x(args->ray, args->N, i), RTCRayN_dir_y(args->ray, args->N, i), RTCRayN_dir_z(args->ray, args->N, i));
-    const Vec3 ng(RTCHitN_Ng_x(args->hit, args->N, i), RTCHitN_Ng_y(args->hit, args->N, i), RTCHitN_Ng_z(args->hit, args->N, i));
-    // TRAP: inside an instance both the ray and Ng are in object space here; the sign is the same in world space, mirrored or not, because
-    // normals transform by the inverse transpose.
+    const Vec3 direction(RTCRayN_dir_x(args->ray, args->N, i), RTCRayN_dir_y(args->ray, args->N, i),
+                         RTCRayN_dir_z(args->ray, args->N, i));
+    const Vec3 ng(RTCHitN_Ng_x(args->hit, args->N, i), RTCHitN_Ng_y(args->hit, args->N, i),
+                  RTCHitN_Ng_z(args->hit, args->N, i));
+    // TRAP: inside an instance both the ray and Ng are in object space here; the sign is the same in world space,
+    // mirrored or not, because normals transform by the inverse transpose.
     const bool backFace = glm::dot(direction, ng) > 0;
     if (data->filter->passThrough(data->mesh, RTCHitN_primID(args->hit, args->N, i), RTCHitN_u(args->hit, args->N, i),
                                   RTCHitN_v(args->hit, args->N, i), backFace, RTCRayN_id(args->ray, args->N, i)))

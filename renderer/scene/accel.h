@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ray queries by Embree over shared vertex and index buffers; single-level instances; an any-hit filter only for surfaces that need one.
+// Ray queries by Embree over shared vertex and index buffers; single-level instances; an any-hit filter only for
+// surfaces that need one.
 #pragma once
 
 #include <array>
@@ -22,7 +23,8 @@ namespace braid {
 
 inline constexpr uint32_t kNoInstance = ~0u;
 
-// A ray; `direction` need not be unit, t is in units of its length. `salt` makes stochastic coverage differ between rays.
+// A ray; `direction` need not be unit, t is in units of its length. `salt` makes stochastic coverage differ between
+// rays.
 struct RayQuery {
   Vec3 origin, direction;
   float tmax = kInfinity;
@@ -31,19 +33,21 @@ struct RayQuery {
 
 struct RayHit {
   float t = kInfinity;
-  float u = 0, v = 0;         // barycentric weights of the second and third vertex
-  uint32_t mesh = 0;          // index into the scene's meshes
+  float u = 0, v = 0;  // barycentric weights of the second and third vertex
+  uint32_t mesh = 0;   // index into the scene's meshes
   uint32_t triangle = 0;
-  uint32_t instance = kNoInstance;  // index into the scene's instances, or kNoInstance when the mesh lies in world space
+  uint32_t instance =
+      kNoInstance;  // index into the scene's instances, or kNoInstance when the mesh lies in world space
 };
 
-// Rays are traced in packets of kPacket: also for unrelated rays that is faster than one at a time (0.74x the time in a room of 38 triangles, 0.95x
-// in one of a million), because a packet shares the work of the upper hierarchy.
+// Rays are traced in packets of kPacket: also for unrelated rays that is faster than one at a time (0.74x the time in a
+// room of 38 triangles, 0.95x in one of a million), because a packet shares the work of the upper hierarchy.
 inline constexpr int kPacket = 8;
 inline constexpr int kBatch = 64;
 
-// Up to kBatch rays in Embree's own layout. Rays are written one by one as they come up, long before they are traced: a packet filled just before
-// its use would stall, because Embree loads eight lanes at once where single floats were stored a moment ago.
+// Up to kBatch rays in Embree's own layout. Rays are written one by one as they come up, long before they are traced: a
+// packet filled just before its use would stall, because Embree loads eight lanes at once where single floats were
+// stored a moment ago.
 template <class Packet>
 class PacketBatch {
  public:
@@ -98,7 +102,8 @@ struct AccelInput {
   bool highQuality = true;  // spatial splits
 };
 
-// Decides whether a ray passes through a candidate hit (alpha, culled back faces). `salt` makes stochastic decisions differ between rays.
+// Decides whether a ray passes through a candidate hit (alpha, culled back faces). `salt` makes stochastic decisions
+// differ between rays.
 class HitFilter {
  public:
   virtual ~HitFilter() = default;

@@ -12,8 +12,8 @@ namespace braid {
 class Camera {
  public:
   Camera() = default;
-  // `width` × `height` is the full frame in pixels. A camera with its own aspect ratio keeps its vertical extent; the horizontal one follows
-  // the frame's aspect, as glTF leaves to the renderer.
+  // `width` × `height` is the full frame in pixels. A camera with its own aspect ratio keeps its vertical extent; the
+  // horizontal one follows the frame's aspect, as glTF leaves to the renderer.
   Camera(const CameraData& data, int width, int height);
 
   struct CameraRay {

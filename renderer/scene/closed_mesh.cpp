@@ -20,7 +20,8 @@ std::vector<uint32_t> weldPositions(const std::vector<Vec3>& positions) {
   std::sort(order.begin(), order.end(), less);
   std::vector<uint32_t> id(positions.size());
   for (size_t i = 0; i < order.size(); ++i)
-    id[order[i]] = i > 0 && positions[order[i]] == positions[order[i - 1]] ? id[order[i - 1]] : static_cast<uint32_t>(i);
+    id[order[i]] =
+        i > 0 && positions[order[i]] == positions[order[i - 1]] ? id[order[i - 1]] : static_cast<uint32_t>(i);
   return id;
 }
 
@@ -35,7 +36,8 @@ bool isClosedOutward(const TriangleMesh& mesh) {
     const uint32_t v[3] = {id[t.x], id[t.y], id[t.z]};
     if (v[0] == v[1] || v[1] == v[2] || v[2] == v[0]) continue;
     for (int k = 0; k < 3; ++k) edges.push_back(uint64_t(v[k]) << 32 | v[(k + 1) % 3]);
-    const glm::dvec3 a(mesh.positions[t.x] - mesh.positions[0]), b(mesh.positions[t.y] - mesh.positions[0]), c(mesh.positions[t.z] - mesh.positions[0]);
+    const glm::dvec3 a(mesh.positions[t.x] - mesh.positions[0]), b(mesh.positions[t.y] - mesh.positions[0]),
+        c(mesh.positions[t.z] - mesh.positions[0]);
     volume += glm::dot(a, glm::cross(b, c));
   }
   std::sort(edges.begin(), edges.end());

@@ -6,8 +6,8 @@
 
 namespace braid {
 
-// True if every edge of the mesh (vertices joined by position) is shared by two triangles that run along it in opposite directions, and the
-// enclosed signed volume is positive, i.e. the front faces look outward.
+// True if every edge of the mesh (vertices joined by position) is shared by two triangles that run along it in opposite
+// directions, and the enclosed signed volume is positive, i.e. the front faces look outward.
 bool isClosedOutward(const TriangleMesh& mesh);
 
 }  // namespace braid

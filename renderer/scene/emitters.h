@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Emissive triangles of the scene in world space, one record per triangle and placement, and the way from a hit to its record.
+// Emissive triangles of the scene in world space, one record per triangle and placement, and the way from a hit to its
+// record.
 #pragma once
 
 #include <cstdint>
@@ -10,10 +11,10 @@
 namespace braid {
 
 struct EmissiveTriangle {
-  Vec3 p0, e1, e2;          // world: corner and two edges, metres
-  Vec3 normal;              // unit, front side
-  float area = 0;           // m²
-  Spectrum meanRadiance{0}; // of the front side, averaged over the triangle (textures included)
+  Vec3 p0, e1, e2;           // world: corner and two edges, metres
+  Vec3 normal;               // unit, front side
+  float area = 0;            // m²
+  Spectrum meanRadiance{0};  // of the front side, averaged over the triangle (textures included)
   uint32_t mesh = 0, triangle = 0;
   bool twoSided = false;
   bool textured = false;

@@ -33,8 +33,12 @@ Environment::Environment(const EnvironmentData& data) : image_(data.image), scal
 }
 
 // The angle φ grows to the right of the image; its centre (φ = π) is -Z and its upper edge +Y.
-Vec3 Environment::toLocal(const Vec3& d) const { return {cosRotation_ * d.x - sinRotation_ * d.z, d.y, sinRotation_ * d.x + cosRotation_ * d.z}; }
-Vec3 Environment::toWorld(const Vec3& d) const { return {cosRotation_ * d.x + sinRotation_ * d.z, d.y, -sinRotation_ * d.x + cosRotation_ * d.z}; }
+Vec3 Environment::toLocal(const Vec3& d) const {
+  return {cosRotation_ * d.x - sinRotation_ * d.z, d.y, sinRotation_ * d.x + cosRotation_ * d.z};
+}
+Vec3 Environment::toWorld(const Vec3& d) const {
+  return {cosRotation_ * d.x + sinRotation_ * d.z, d.y, -sinRotation_ * d.x + cosRotation_ * d.z};
+}
 
 Spectrum Environment::texel(int x, int y) const {
   const size_t channels = static_cast<size_t>(image_->channels);
@@ -51,8 +55,8 @@ Spectrum Environment::texel(int x, int y) const {
   return channels >= 3 ? Spectrum(decode(p[0]), decode(p[1]), decode(p[2])) : Spectrum(decode(p[0]));
 }
 
-// The density of a texel is the mean of the bilinear interpolant over it (weights 1/8, 3/4, 1/8 on each axis), so that it is positive
-// wherever the interpolated radiance is.
+// The density of a texel is the mean of the bilinear interpolant over it (weights 1/8, 3/4, 1/8 on each axis), so that
+// it is positive wherever the interpolated radiance is.
 void Environment::buildDistribution() {
   const size_t w = static_cast<size_t>(width_), h = static_cast<size_t>(height_);
   std::vector<float> luminances(w * h);
@@ -70,7 +74,8 @@ void Environment::buildDistribution() {
   marginal_.resize(h + 1);
   std::vector<double> rowWeight(h);
   const auto at = [&](int x, int y) {
-    return luminances[static_cast<size_t>(std::clamp(y, 0, height_ - 1)) * w + static_cast<size_t>((x + width_) % width_)];
+    return luminances[static_cast<size_t>(std::clamp(y, 0, height_ - 1)) * w +
+                      static_cast<size_t>((x + width_) % width_)];
   };
   parallelRows(height_, [&](int y) {
     float* cdf = &conditional_[static_cast<size_t>(y) * (w + 1)];
@@ -79,7 +84,8 @@ void Environment::buildDistribution() {
     for (int x = 0; x < width_; ++x) {
       double v = 0;
       for (int dy = -1; dy <= 1; ++dy)
-        for (int dx = -1; dx <= 1; ++dx) v += (dx ? 0.125 : 0.75) * (dy ? 0.125 : 0.75) * static_cast<double>(at(x + dx, y + dy));
+        for (int dx = -1; dx <= 1; ++dx)
+          v += (dx ? 0.125 : 0.75) * (dy ? 0.125 : 0.75) * static_cast<double>(at(x + dx, y + dy));
       sum[static_cast<size_t>(x) + 1] = sum[static_cast<size_t>(x)] + v;
     }
     rowWeight[static_cast<size_t>(y)] = sum[w] / static_cast<double>(w) * static_cast<double>(sinTheta);
@@ -90,13 +96,15 @@ void Environment::buildDistribution() {
   glm::dvec3 mean(0);
   std::vector<double> cumulative(h + 1, 0.0);
   for (size_t y = 0; y < h; ++y) {
-    const double sinTheta = std::sin(static_cast<double>(kPi) * (static_cast<double>(y) + 0.5) / static_cast<double>(h));
+    const double sinTheta =
+        std::sin(static_cast<double>(kPi) * (static_cast<double>(y) + 0.5) / static_cast<double>(h));
     total += rowWeight[y];
     cumulative[y + 1] = total;
     mean += rowSum[y] * sinTheta;
     sinTotal += sinTheta;
   }
-  for (size_t y = 0; y <= h; ++y) marginal_[y] = static_cast<float>(total > 0 ? cumulative[y] / total : double(y) / double(h));
+  for (size_t y = 0; y <= h; ++y)
+    marginal_[y] = static_cast<float>(total > 0 ? cumulative[y] / total : double(y) / double(h));
   average_ = total > 0 ? scale_ * Spectrum(mean / sinTotal) : Spectrum(0);
 }
 
@@ -124,7 +132,8 @@ float Environment::sample(Vec2 u, Vec3& direction) const {
   }
   float fx, fy;
   const size_t y = findInterval(marginal_.data(), static_cast<size_t>(height_), u.y, fy);
-  const size_t x = findInterval(&conditional_[y * (static_cast<size_t>(width_) + 1)], static_cast<size_t>(width_), u.x, fx);
+  const size_t x =
+      findInterval(&conditional_[y * (static_cast<size_t>(width_) + 1)], static_cast<size_t>(width_), u.x, fx);
   const float theta = kPi * (static_cast<float>(y) + fy) / static_cast<float>(height_);
   const float phi = 2 * kPi * ((static_cast<float>(x) + fx) / static_cast<float>(width_) - 0.5f);
   const float sinTheta = std::sin(theta);

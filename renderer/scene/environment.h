@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The environment: a latitude-longitude image or a constant, looked up by direction and importance-sampled by luminance · sin θ.
+// The environment: a latitude-longitude image or a constant, looked up by direction and importance-sampled by luminance
+// · sin θ.
 #pragma once
 
 #include <memory>

@@ -41,7 +41,7 @@ struct Material {
   float ior = 1.5f;  // 0 is legal: F = 1 (KHR_materials_ior)
   float dispersion = 0;
 
-  float specular = 1;  // KHR_materials_specular
+  float specular = 1;          // KHR_materials_specular
   TextureRef specularTexture;  // A
   Spectrum specularColor{1};
   TextureRef specularColorTexture;  // RGB (sRGB)

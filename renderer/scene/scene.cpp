@@ -18,8 +18,8 @@ double secondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-// Bakes a transform into a mesh. Normals go by the inverse transpose; a mirrored mesh has its winding turned so that the cross product of
-// the edges keeps pointing to the front.
+// Bakes a transform into a mesh. Normals go by the inverse transpose; a mirrored mesh has its winding turned so that
+// the cross product of the edges keeps pointing to the front.
 void transformMesh(TriangleMesh& mesh, const Mat4& toWorld) {
   if (toWorld == Mat4(1)) return;
   const Mat3 linear(toWorld);
@@ -68,8 +68,9 @@ Scene::Scene(SceneData data, const SceneOptions& options) : data_(std::move(data
   times_.hierarchy = secondsSince(buildStart);
 }
 
-// Meshes placed once are baked into world space, which spares every ray the instance transform; meshes placed several times keep one copy.
-// Meshes with the same list of placements form a group, so that a tree's trunk and leaves are one instance.
+// Meshes placed once are baked into world space, which spares every ray the instance transform; meshes placed several
+// times keep one copy. Meshes with the same list of placements form a group, so that a tree's trunk and leaves are one
+// instance.
 void Scene::placeMeshes() {
   std::vector<std::vector<size_t>> placements(data_.meshes.size());
   for (size_t i = 0; i < data_.instances.size(); ++i) placements[data_.instances[i].mesh].push_back(i);
@@ -113,12 +114,13 @@ void Scene::placeMeshes() {
   for (const GroupInstance& instance : instances_) {
     const Bounds& b = groupBounds[instance.group];
     for (int corner = 0; corner < 8; ++corner)
-      bounds_.extend(Vec3(instance.toWorld * Vec4(corner & 1 ? b.hi.x : b.lo.x, corner & 2 ? b.hi.y : b.lo.y, corner & 4 ? b.hi.z : b.lo.z, 1)));
+      bounds_.extend(Vec3(instance.toWorld * Vec4(corner & 1 ? b.hi.x : b.lo.x, corner & 2 ? b.hi.y : b.lo.y,
+                                                  corner & 4 ? b.hi.z : b.lo.z, 1)));
   }
 }
 
-// A mesh needs the any-hit filter when rays may pass through its triangles: alpha, or culled back faces of an open single-sided surface.
-// A closed outward-facing surface is never seen from behind, so its back faces need no culling.
+// A mesh needs the any-hit filter when rays may pass through its triangles: alpha, or culled back faces of an open
+// single-sided surface. A closed outward-facing surface is never seen from behind, so its back faces need no culling.
 void Scene::markFilteredMeshes(bool full) {
   filtered_.assign(data_.meshes.size(), 0);
   tbb::parallel_for(size_t(0), data_.meshes.size(), [&](size_t m) {
@@ -240,8 +242,9 @@ bool Scene::passThrough(uint32_t meshIndex, uint32_t triangle, float u, float v,
 size_t Scene::geometryBytes() const {
   size_t bytes = instances_.size() * sizeof(GroupInstance) + emitters_.size() * sizeof(EmissiveTriangle);
   for (const TriangleMesh& m : data_.meshes)
-    bytes += m.positions.capacity() * sizeof(Vec3) + m.triangles.capacity() * sizeof(glm::uvec3) + m.normals.capacity() * sizeof(Vec3) +
-             m.tangents.capacity() * sizeof(Vec4) + (m.uv[0].capacity() + m.uv[1].capacity()) * sizeof(Vec2) + m.colors.capacity() * sizeof(Vec4);
+    bytes += m.positions.capacity() * sizeof(Vec3) + m.triangles.capacity() * sizeof(glm::uvec3) +
+             m.normals.capacity() * sizeof(Vec3) + m.tangents.capacity() * sizeof(Vec4) +
+             (m.uv[0].capacity() + m.uv[1].capacity()) * sizeof(Vec2) + m.colors.capacity() * sizeof(Vec4);
   return bytes;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The immutable scene that integrators see: geometry with its ray acceleration structure, materials, lights, and what it contains (traits).
+// The immutable scene that integrators see: geometry with its ray acceleration structure, materials, lights, and what
+// it contains (traits).
 #pragma once
 
 #include <memory>
@@ -16,8 +17,8 @@
 namespace braid {
 
 struct SceneOptions {
-  std::string isa;          // Embree instruction set, e.g. "avx2"; empty: Embree's choice
-  bool full = false;        // no pruning: filters on every mesh
+  std::string isa;                  // Embree instruction set, e.g. "avx2"; empty: Embree's choice
+  bool full = false;                // no pruning: filters on every mesh
   std::optional<bool> highQuality;  // spatial splits in the hierarchies; none: up to 4 million triangles
 };
 
@@ -50,7 +51,8 @@ class Scene : private HitFilter {
 
   // Index into emitters() of a hit triangle, or -1.
   int64_t emitterIndex(uint32_t mesh, uint32_t triangle, uint32_t instance) const;
-  // Radiance leaving an emissive surface at a uv-interpolated point of a triangle with barycentric weights (1-u-v, u, v).
+  // Radiance leaving an emissive surface at a uv-interpolated point of a triangle with barycentric weights (1-u-v, u,
+  // v).
   Spectrum emission(const TriangleMesh& mesh, uint32_t triangle, float u, float v) const;
   // Coverage of a surface point in [0,1] (alpha mode OPAQUE: 1).
   float alpha(const TriangleMesh& mesh, uint32_t triangle, float u, float v) const;
@@ -76,8 +78,9 @@ class Scene : private HitFilter {
   std::vector<GroupInstance> instances_;
   std::vector<uint8_t> filtered_;  // per mesh
   std::vector<EmissiveTriangle> emitters_;
-  std::vector<int64_t> meshEmitterBase_;                   // per world mesh index: first emitter or -1
-  std::vector<std::vector<int64_t>> instanceEmitterBase_;  // per instance, per mesh of its group (empty when none emits)
+  std::vector<int64_t> meshEmitterBase_;  // per world mesh index: first emitter or -1
+  std::vector<std::vector<int64_t>>
+      instanceEmitterBase_;  // per instance, per mesh of its group (empty when none emits)
   Bounds bounds_;
   SceneTraits traits_;
   BuildTimes times_;

@@ -13,17 +13,17 @@
 
 namespace braid {
 
-// One glTF primitive as an indexed triangle list. Embree reads positions and triangles in place, so both are allocated with room for one
-// more element (Embree loads 16 bytes a vertex): call padForEmbree() after filling them.
+// One glTF primitive as an indexed triangle list. Embree reads positions and triangles in place, so both are allocated
+// with room for one more element (Embree loads 16 bytes a vertex): call padForEmbree() after filling them.
 struct TriangleMesh {
   std::string name;
   std::vector<Vec3> positions;
   std::vector<glm::uvec3> triangles;
-  std::vector<Vec3> normals;          // empty: flat shading by the geometric normal
-  std::vector<Vec4> tangents;         // empty unless the material needs them; w = ±1 is the sign of the bitangent
-  std::vector<Vec2> uv[2];            // empty unless a texture reads them
-  std::vector<Vec4> colors;           // empty, or linear RGBA in [0,1] multiplying the base colour
-  uint32_t material = 0;              // index into SceneData::materials, always valid
+  std::vector<Vec3> normals;   // empty: flat shading by the geometric normal
+  std::vector<Vec4> tangents;  // empty unless the material needs them; w = ±1 is the sign of the bitangent
+  std::vector<Vec2> uv[2];     // empty unless a texture reads them
+  std::vector<Vec4> colors;    // empty, or linear RGBA in [0,1] multiplying the base colour
+  uint32_t material = 0;       // index into SceneData::materials, always valid
 
   void padForEmbree() {
     positions.reserve(positions.size() + 1);
@@ -43,24 +43,25 @@ enum class PunctualKind { Point, Spot, Directional };
 struct PunctualLight {
   std::string name;
   PunctualKind kind = PunctualKind::Point;
-  Spectrum intensity{1};        // colour · intensity
+  Spectrum intensity{1};  // colour · intensity
   Vec3 position{0};
-  Vec3 direction{0, 0, -1};     // the way the light travels, unit
-  float range = kInfinity;      // metres, a hard cut-off
-  float innerConeAngle = 0;     // radians
+  Vec3 direction{0, 0, -1};  // the way the light travels, unit
+  float range = kInfinity;   // metres, a hard cut-off
+  float innerConeAngle = 0;  // radians
   float outerConeAngle = kPi / 4;
 };
 
 struct CameraData {
   std::string name;
-  Mat4 toWorld{1};              // rigid: rotation and translation only; looks along -Z, +Y up
+  Mat4 toWorld{1};  // rigid: rotation and translation only; looks along -Z, +Y up
   bool orthographic = false;
   float yfov = 0.8f;            // radians, full vertical angle (perspective)
   std::optional<float> aspect;  // width / height; none: that of the output
   float xmag = 1, ymag = 1;     // half extents (orthographic), metres
 };
 
-// A latitude-longitude environment: up is +Y, the centre of the image lies in direction -Z; `rotation` turns it about +Y.
+// A latitude-longitude environment: up is +Y, the centre of the image lies in direction -Z; `rotation` turns it about
+// +Y.
 struct EnvironmentData {
   std::shared_ptr<const Image> image;  // null: the constant `radiance`
   Spectrum radiance{0};                // constant radiance, or the scale of the image
@@ -81,10 +82,10 @@ struct SceneData {
   std::vector<std::string> extensionsUsed, extensionsRequired, extensionsIgnored;
   std::vector<std::string> variants;
   std::vector<std::string> sceneNames;
-  std::vector<std::string> warnings;   // one line each, already counted
-  uint64_t contentHash = 0;            // over every referenced byte
-  bool defaultCamera = false;          // the file had none: framed from the bounds
-  bool defaultLight = false;           // the file had none: a grey dome
+  std::vector<std::string> warnings;  // one line each, already counted
+  uint64_t contentHash = 0;           // over every referenced byte
+  bool defaultCamera = false;         // the file had none: framed from the bounds
+  bool defaultLight = false;          // the file had none: a grey dome
 };
 
 }  // namespace braid

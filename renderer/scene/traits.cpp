@@ -9,10 +9,29 @@
 namespace braid {
 
 std::vector<std::string> SceneTraits::names() const {
-  static const char* kNames[] = {"textures",       "normal-maps",  "alpha-mask",           "alpha-blend",   "culled-faces",       "specular",
-                                 "transmission",   "volume",       "diffuse-transmission", "clearcoat",     "sheen",              "anisotropy",
-                                 "iridescence",    "vertex-colors", "texture-transforms",  "instances",     "emissive-triangles", "point-lights",
-                                 "directional-lights", "environment", "environment-image", "smooth-specular", "unlit"};
+  static const char* kNames[] = {"textures",
+                                 "normal-maps",
+                                 "alpha-mask",
+                                 "alpha-blend",
+                                 "culled-faces",
+                                 "specular",
+                                 "transmission",
+                                 "volume",
+                                 "diffuse-transmission",
+                                 "clearcoat",
+                                 "sheen",
+                                 "anisotropy",
+                                 "iridescence",
+                                 "vertex-colors",
+                                 "texture-transforms",
+                                 "instances",
+                                 "emissive-triangles",
+                                 "point-lights",
+                                 "directional-lights",
+                                 "environment",
+                                 "environment-image",
+                                 "smooth-specular",
+                                 "unlit"};
   std::vector<std::string> list;
   for (size_t i = 0; i < std::size(kNames); ++i)
     if (has(1u << i)) list.push_back(kNames[i]);
@@ -23,11 +42,24 @@ namespace {
 
 uint32_t textureFlags(const Material& m) {
   uint32_t flags = 0;
-  const TextureRef* refs[] = {&m.baseColorTexture,     &m.metallicRoughnessTexture, &m.specularGlossinessTexture,  &m.emissiveTexture,
-                              &m.specularTexture,      &m.specularColorTexture,     &m.transmissionTexture,        &m.diffuseTransmissionTexture,
-                              &m.clearcoatTexture,     &m.clearcoatRoughnessTexture, &m.sheenColorTexture,         &m.sheenRoughnessTexture,
-                              &m.anisotropyTexture,    &m.iridescenceTexture,       &m.iridescenceThicknessTexture, &m.diffuseTransmissionColorTexture,
-                              &m.normalTexture,        &m.clearcoatNormalTexture};
+  const TextureRef* refs[] = {&m.baseColorTexture,
+                              &m.metallicRoughnessTexture,
+                              &m.specularGlossinessTexture,
+                              &m.emissiveTexture,
+                              &m.specularTexture,
+                              &m.specularColorTexture,
+                              &m.transmissionTexture,
+                              &m.diffuseTransmissionTexture,
+                              &m.clearcoatTexture,
+                              &m.clearcoatRoughnessTexture,
+                              &m.sheenColorTexture,
+                              &m.sheenRoughnessTexture,
+                              &m.anisotropyTexture,
+                              &m.iridescenceTexture,
+                              &m.iridescenceThicknessTexture,
+                              &m.diffuseTransmissionColorTexture,
+                              &m.normalTexture,
+                              &m.clearcoatNormalTexture};
   for (const TextureRef* ref : refs) {
     if (!*ref) continue;
     flags |= kTraitTextures;
@@ -50,7 +82,8 @@ uint32_t materialFlags(const Material& m) {
   if (m.anisotropy != 0) flags |= kTraitAnisotropy;
   if (m.iridescence > 0) flags |= kTraitIridescence;
   const bool smoothBase = m.roughness < 0.1f || (m.metallicRoughnessTexture && m.roughness > 0);
-  if (((m.metallic > 0 || m.transmission > 0 || m.specularGlossiness) && smoothBase) || (m.clearcoat > 0 && m.clearcoatRoughness < 0.1f))
+  if (((m.metallic > 0 || m.transmission > 0 || m.specularGlossiness) && smoothBase) ||
+      (m.clearcoat > 0 && m.clearcoatRoughness < 0.1f))
     flags |= kTraitSmoothSpecular;
   return flags;
 }
@@ -95,10 +128,12 @@ void Scene::detectTraits() {
   t.punctualLights = data_.lights.size();
   for (const PunctualLight& light : data_.lights)
     t.flags |= light.kind == PunctualKind::Directional ? kTraitDirectionalLights : kTraitPointLights;
-  if (environment_) t.flags |= environment_->constant() ? kTraitEnvironment : kTraitEnvironment | kTraitEnvironmentImage;
+  if (environment_)
+    t.flags |= environment_->constant() ? kTraitEnvironment : kTraitEnvironment | kTraitEnvironmentImage;
 
   t.centre = bounds_.empty() ? Vec3(0) : bounds_.centre();
-  t.radius = bounds_.empty() ? 1.0f : std::max(0.5f * glm::length(bounds_.diagonal()), std::numeric_limits<float>::min());
+  t.radius =
+      bounds_.empty() ? 1.0f : std::max(0.5f * glm::length(bounds_.diagonal()), std::numeric_limits<float>::min());
 }
 
 }  // namespace braid

@@ -15,10 +15,10 @@ enum TraitFlags : uint32_t {
   kTraitNormalMaps = 1u << 1,
   kTraitAlphaMask = 1u << 2,
   kTraitAlphaBlend = 1u << 3,
-  kTraitCulledFaces = 1u << 4,       // single-sided open surfaces
-  kTraitSpecular = 1u << 5,          // any GGX reflection
+  kTraitCulledFaces = 1u << 4,  // single-sided open surfaces
+  kTraitSpecular = 1u << 5,     // any GGX reflection
   kTraitTransmission = 1u << 6,
-  kTraitVolume = 1u << 7,            // attenuation or refraction inside closed solids
+  kTraitVolume = 1u << 7,  // attenuation or refraction inside closed solids
   kTraitDiffuseTransmission = 1u << 8,
   kTraitClearcoat = 1u << 9,
   kTraitSheen = 1u << 10,
@@ -28,11 +28,11 @@ enum TraitFlags : uint32_t {
   kTraitTextureTransforms = 1u << 14,
   kTraitInstances = 1u << 15,
   kTraitEmissiveTriangles = 1u << 16,
-  kTraitPointLights = 1u << 17,      // point and spot
+  kTraitPointLights = 1u << 17,  // point and spot
   kTraitDirectionalLights = 1u << 18,
   kTraitEnvironment = 1u << 19,
   kTraitEnvironmentImage = 1u << 20,
-  kTraitSmoothSpecular = 1u << 21,   // roughness < 0.1 on a metal, clearcoat or transmissive surface: may cast caustics
+  kTraitSmoothSpecular = 1u << 21,  // roughness < 0.1 on a metal, clearcoat or transmissive surface: may cast caustics
   kTraitUnlit = 1u << 22,
 };
 

@@ -30,7 +30,7 @@ struct PassRequest {
   const TransportContext& context;
   const Plan& plan;
   uint64_t pass = 0;
-  const std::atomic<bool>* cancel = nullptr;      // checked per tile; a cancelled pass is discarded
+  const std::atomic<bool>* cancel = nullptr;  // checked per tile; a cancelled pass is discarded
   PassStatistics* statistics = nullptr;
   std::vector<std::vector<RecordedRay>>* record = nullptr;  // per tile, for benchmarks; usually null
 };
@@ -46,10 +46,12 @@ class Integrator {
   // Renders pass `request.pass` of the plan's window into the target. Returns false when cancelled.
   virtual bool renderPass(const PassRequest& request, PassTarget& target) const = 0;
 
-  // For replaying camera paths: the random numbers of a pass and of a pixel in it; none where there are no camera paths by the path kernel.
+  // For replaying camera paths: the random numbers of a pass and of a pixel in it; none where there are no camera paths
+  // by the path kernel.
   virtual std::unique_ptr<PassSampler> pixelSampler(const Plan&, uint64_t /*pass*/) const { return nullptr; }
   virtual uint64_t pixelKey(const PassSampler& sampler, const Plan& plan, int x, int y) const {
-    return sampler.itemKey(static_cast<uint64_t>(y) * static_cast<uint64_t>(plan.settings.width) + static_cast<uint64_t>(x));
+    return sampler.itemKey(static_cast<uint64_t>(y) * static_cast<uint64_t>(plan.settings.width) +
+                           static_cast<uint64_t>(x));
   }
 };
 

@@ -10,7 +10,8 @@ namespace {
 
 constexpr size_t kTable = 256;
 
-// Inverse of the cumulative distribution of a positive, symmetric filter of the given radius, tabulated at u = i / kTable.
+// Inverse of the cumulative distribution of a positive, symmetric filter of the given radius, tabulated at u = i /
+// kTable.
 template <class F>
 std::array<float, kTable + 1> invertFilter(float radius, const F& filter) {
   constexpr int kSteps = 8192;
@@ -25,7 +26,8 @@ std::array<float, kTable + 1> invertFilter(float radius, const F& filter) {
     const double target = cumulative[kSteps] * static_cast<double>(i) / kTable;
     while (step + 1 < kSteps && cumulative[step + 1] < target) ++step;
     const double width = cumulative[step + 1] - cumulative[step];
-    const double position = static_cast<double>(step) + (width > 0 ? std::clamp((target - cumulative[step]) / width, 0.0, 1.0) : 0.5);
+    const double position =
+        static_cast<double>(step) + (width > 0 ? std::clamp((target - cumulative[step]) / width, 0.0, 1.0) : 0.5);
     inverse[i] = static_cast<float>((2 * position / kSteps - 1) * static_cast<double>(radius));
   }
   return inverse;
@@ -42,7 +44,8 @@ float lookUp(const std::array<float, kTable + 1>& inverse, float u) {
 
 float sampleFilter(PixelFilter filter, float u) {
   switch (filter) {
-    case PixelFilter::Box: break;
+    case PixelFilter::Box:
+      break;
     case PixelFilter::Gaussian: {
       static const auto inverse = invertFilter(1.5f, [](double x) { return std::exp(-2 * x * x); });
       return lookUp(inverse, u);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reconstruction filters by importance sampling: the sample position is drawn from the filter, so a camera sample touches one pixel only
-// and every per-pixel variance model stays true (Ernst et al. 2006). Radii in pixels.
+// Reconstruction filters by importance sampling: the sample position is drawn from the filter, so a camera sample
+// touches one pixel only and every per-pixel variance model stays true (Ernst et al. 2006). Radii in pixels.
 #pragma once
 
 #include "renderer/core/vec.h"

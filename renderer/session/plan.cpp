@@ -14,7 +14,8 @@ namespace braid {
 
 namespace {
 
-void planIntegrators(const SceneTraits& traits, const Settings& settings, const std::vector<const Integrator*>& available, Plan& plan) {
+void planIntegrators(const SceneTraits& traits, const Settings& settings,
+                     const std::vector<const Integrator*>& available, Plan& plan) {
   std::string known;
   for (const Integrator* i : available) known += fmt::format("{}{}", known.empty() ? "" : ", ", i->name());
   for (const std::string& name : settings.integrators) {
@@ -39,11 +40,12 @@ void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
     const bool has = t.has(flag) || settings.full;
     plan.lines.push_back({has, subject, t.has(flag) ? kept : settings.full ? "kept by --full" : left});
   };
-  part(kTraitAlphaMask | kTraitAlphaBlend | kTraitCulledFaces, "any-hit filter", "alpha or open single-sided surfaces let rays pass",
-       "no alpha mode and no open single-sided surface");
+  part(kTraitAlphaMask | kTraitAlphaBlend | kTraitCulledFaces, "any-hit filter",
+       "alpha or open single-sided surfaces let rays pass", "no alpha mode and no open single-sided surface");
   part(kTraitTextures, "texture lookups", "materials read textures", "no material reads a texture");
   part(kTraitTextureTransforms, "texture transforms", "KHR_texture_transform is used", "no transformed texture");
-  part(kTraitNormalMaps, "normal maps and tangents", "normal-mapped materials", "no normal map and no anisotropy reads them");
+  part(kTraitNormalMaps, "normal maps and tangents", "normal-mapped materials",
+       "no normal map and no anisotropy reads them");
   part(kTraitVertexColors, "vertex colours", "COLOR_0 multiplies base colours", "no mesh has vertex colours");
   part(kTraitSpecular, "specular lobe", "materials reflect specularly", "every material is perfectly diffuse");
   part(kTraitTransmission, "transmission lobe", "transmissive materials", "no material transmits light");
@@ -52,18 +54,22 @@ void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
   part(kTraitSheen, "sheen lobe", "sheen materials", "no sheen");
   part(kTraitIridescence, "iridescence", "thin films", "no thin film");
   part(kTraitAnisotropy, "anisotropy", "anisotropic materials", "no anisotropic material");
-  part(kTraitInstances, "instance transforms", "meshes placed several times", "every mesh is placed once and lies in world space");
+  part(kTraitInstances, "instance transforms", "meshes placed several times",
+       "every mesh is placed once and lies in world space");
   part(kTraitEnvironmentImage, "environment sampling", "an environment image, sampled by luminance",
        t.has(kTraitEnvironment) ? "the environment is constant" : "no environment");
-  const auto positional = static_cast<uint64_t>(std::count_if(scene.lights().begin(), scene.lights().end(), [](const PunctualLight& l) {
-                            return l.kind != PunctualKind::Directional;
-                          }));
+  const auto positional =
+      static_cast<uint64_t>(std::count_if(scene.lights().begin(), scene.lights().end(),
+                                          [](const PunctualLight& l) { return l.kind != PunctualKind::Directional; }));
   const uint64_t finite = t.emissiveTriangles + positional;
-  const bool hierarchy = settings.lightStrategy == LightStrategy::Hierarchy || (settings.lightStrategy == LightStrategy::Automatic && hierarchyPays(t.emissiveTriangles, positional));
+  const bool hierarchy =
+      settings.lightStrategy == LightStrategy::Hierarchy ||
+      (settings.lightStrategy == LightStrategy::Automatic && hierarchyPays(t.emissiveTriangles, positional));
   plan.lines.push_back({hierarchy, "light hierarchy",
                         hierarchy ? fmt::format("{} finite lights", finite)
-                                  : settings.lightStrategy == LightStrategy::Power ? "lights are chosen by power on request"
-                                                                                   : fmt::format("{} finite lights: chosen by power", finite)});
+                        : settings.lightStrategy == LightStrategy::Power
+                            ? "lights are chosen by power on request"
+                            : fmt::format("{} finite lights: chosen by power", finite)});
 }
 
 void planFilm(const Settings& settings, Plan& plan) {
@@ -73,22 +79,29 @@ void planFilm(const Settings& settings, Plan& plan) {
   plan.filmBytesPerPixel = accumulator * plan.integrators.size() + 12;
   if (plan.features) plan.filmBytesPerPixel += FeatureSample::kComponents * (3 * 8 + 4);
   if (settings.transparent) plan.filmBytesPerPixel += 12;
-  plan.lines.push_back({plan.buckets == 4, "quarter buckets", plan.buckets == 4 ? "asked for" : "no output or combiner reads quarters: two half buffers"});
-  plan.lines.push_back({plan.features, "features", plan.features ? "albedo, normal, depth, visibility for outputs" : "no output or combiner reads them"});
-  plan.lines.push_back({true, "film", fmt::format("{} bytes a pixel, {:.1f} MiB", plan.filmBytesPerPixel,
-                                                  static_cast<double>(plan.filmBytesPerPixel) * plan.window.width() * plan.window.height() / 1048576.0)});
+  plan.lines.push_back({plan.buckets == 4, "quarter buckets",
+                        plan.buckets == 4 ? "asked for" : "no output or combiner reads quarters: two half buffers"});
+  plan.lines.push_back(
+      {plan.features, "features",
+       plan.features ? "albedo, normal, depth, visibility for outputs" : "no output or combiner reads them"});
+  plan.lines.push_back({true, "film",
+                        fmt::format("{} bytes a pixel, {:.1f} MiB", plan.filmBytesPerPixel,
+                                    static_cast<double>(plan.filmBytesPerPixel) * plan.window.width() *
+                                        plan.window.height() / 1048576.0)});
 }
 
 }  // namespace
 
-Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& settings, const std::vector<const Integrator*>& available) {
+Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& settings,
+              const std::vector<const Integrator*>& available) {
   Plan plan;
   plan.settings = settings;
   plan.camera = Camera(camera, settings.width, settings.height);
   plan.window = settings.crop.value_or(PixelWindow{0, 0, settings.width, settings.height});
   const PixelWindow& w = plan.window;
   if (w.x0 < 0 || w.y0 < 0 || w.x1 > settings.width || w.y1 > settings.height || w.width() <= 0 || w.height() <= 0)
-    throw Error(ExitCode::Usage, fmt::format("the crop {},{},{},{} is empty or outside the {}x{} frame", w.x0, w.y0, w.x1, w.y1, settings.width, settings.height));
+    throw Error(ExitCode::Usage, fmt::format("the crop {},{},{},{} is empty or outside the {}x{} frame", w.x0, w.y0,
+                                             w.x1, w.y1, settings.width, settings.height));
   planIntegrators(scene.traits(), settings, available, plan);
   planSceneParts(scene, settings, plan);
   planFilm(settings, plan);
@@ -97,15 +110,17 @@ Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& sett
 
 std::string Plan::text() const {
   std::string text;
-  for (const PlanLine& line : lines) text += fmt::format("{} {}: {}\n", line.kept ? '+' : '-', line.subject, line.reason);
+  for (const PlanLine& line : lines)
+    text += fmt::format("{} {}: {}\n", line.kept ? '+' : '-', line.subject, line.reason);
   return text;
 }
 
 uint64_t Plan::hash() const {
   ContentHash h;
   h.add(text());
-  h.add(fmt::format("{} {} {} {} {} {} {} {}", settings.width, settings.height, settings.maxDepth, settings.seed, static_cast<int>(settings.sampler),
-                    toString(settings.filter), settings.clamp, settings.transparent));
+  h.add(fmt::format("{} {} {} {} {} {} {} {}", settings.width, settings.height, settings.maxDepth, settings.seed,
+                    static_cast<int>(settings.sampler), toString(settings.filter), settings.clamp,
+                    settings.transparent));
   return h.value();
 }
 

@@ -40,6 +40,7 @@ struct Plan {
 };
 
 // `available` are the registered integrators. Throws Error(Usage) naming an unknown integrator and the known ones.
-Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& settings, const std::vector<const Integrator*>& available);
+Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& settings,
+              const std::vector<const Integrator*>& available);
 
 }  // namespace braid

@@ -22,7 +22,8 @@ class Clock {
 template <class P, class Get>
 FeaturePlanes<P> featurePlanes(const Get& get) {
   return {get([](const FeatureAccumulator& a, int c) { return a.mean(c); }),
-          {get([](const FeatureAccumulator& a, int c) { return a.halfMean(c, 0); }), get([](const FeatureAccumulator& a, int c) { return a.halfMean(c, 1); })},
+          {get([](const FeatureAccumulator& a, int c) { return a.halfMean(c, 0); }),
+           get([](const FeatureAccumulator& a, int c) { return a.halfMean(c, 1); })},
           get([](const FeatureAccumulator& a, int c) { return a.variance(c); })};
 }
 
@@ -35,7 +36,8 @@ Features collectFeatures(const FeatureAccumulator& a) {
     };
   };
   const auto single = [&](int component) { return [&a, component](auto plane) { return plane(a, component); }; };
-  return {featurePlanes<Rgb<float>>(rgb(0)), featurePlanes<Rgb<float>>(rgb(3)), featurePlanes<Plane<float>>(single(6)), featurePlanes<Plane<float>>(single(7))};
+  return {featurePlanes<Rgb<float>>(rgb(0)), featurePlanes<Rgb<float>>(rgb(3)), featurePlanes<Plane<float>>(single(6)),
+          featurePlanes<Plane<float>>(single(7))};
 }
 
 }  // namespace
@@ -44,15 +46,19 @@ const char* toString(StopReason reason) {
   return reason == StopReason::Samples ? "samples" : reason == StopReason::Time ? "time" : "cancelled";
 }
 
-Session::Session(const Scene& scene, Plan plan) : scene_(scene), plan_(std::move(plan)), context_(scene, plan_.settings.lightStrategy) {
+Session::Session(const Scene& scene, Plan plan)
+    : scene_(scene), plan_(std::move(plan)), context_(scene, plan_.settings.lightStrategy) {
   if (plan_.integrators.empty()) throw Error(ExitCode::Usage, "no integrator to run: name one with --integrator");
-  for (size_t i = 0; i < plan_.integrators.size(); ++i) accumulators_.emplace_back(plan_.window.width(), plan_.window.height(), plan_.buckets);
+  for (size_t i = 0; i < plan_.integrators.size(); ++i)
+    accumulators_.emplace_back(plan_.window.width(), plan_.window.height(), plan_.buckets);
   seconds_.assign(plan_.integrators.size(), 0.0);
   if (plan_.features) features_ = std::make_unique<FeatureAccumulator>(plan_.window.width(), plan_.window.height());
-  if (plan_.settings.transparent) coverage_ = std::make_unique<CoverageAccumulator>(plan_.window.width(), plan_.window.height());
+  if (plan_.settings.transparent)
+    coverage_ = std::make_unique<CoverageAccumulator>(plan_.window.width(), plan_.window.height());
 }
 
-RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bool>* cancel, const std::atomic<bool>* abandon) {
+RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bool>* cancel,
+                          const std::atomic<bool>* abandon) {
   const Settings& settings = plan_.settings;
   PassStatistics statistics;
   RenderResult result;
@@ -75,11 +81,14 @@ RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bo
         for (int k = 0; k < plan_.integrators[i].passesPerRound && !abandoned; ++k) {
           const uint64_t pass = accumulators_[i].passes();
           target.clear();
-          abandoned = !plan_.integrators[i].integrator->renderPass({context_, plan_, pass, abandon, &statistics, nullptr}, target);
+          abandoned = !plan_.integrators[i].integrator->renderPass(
+              {context_, plan_, pass, abandon, &statistics, nullptr}, target);
           if (abandoned) break;
           const int64_t rejected = statistics.rejectedPixel.load();
           if (rejected >= 0 && !result.firstRejected)
-            result.firstRejected = {plan_.integrators[i].integrator->name(), pass, static_cast<int>(rejected % settings.width), static_cast<int>(rejected / settings.width)};
+            result.firstRejected = {plan_.integrators[i].integrator->name(), pass,
+                                    static_cast<int>(rejected % settings.width),
+                                    static_cast<int>(rejected / settings.width)};
           accumulators_[i].commit(pass, target);
           if (i == 0 && features_) features_->commit(pass, target);
           if (i == 0 && coverage_) coverage_->commit(target);
@@ -93,7 +102,8 @@ RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bo
       p.seconds = clock.seconds();
       p.rejected = 0;
       for (const Accumulator& a : accumulators_) p.rejected += a.rejected();
-      if (settings.spp > 0 && p.round > 0) p.secondsLeft = p.seconds / static_cast<double>(p.round) * static_cast<double>(settings.spp - p.round);
+      if (settings.spp > 0 && p.round > 0)
+        p.secondsLeft = p.seconds / static_cast<double>(p.round) * static_cast<double>(settings.spp - p.round);
       if (settings.seconds > 0) {
         const double left = std::max(0.0, settings.seconds - p.seconds);
         p.secondsLeft = p.secondsLeft < 0 ? left : std::min(p.secondsLeft, left);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pass loop: rounds of passes until samples, time or the caller end it; nothing here depends on which integrators exist.
+// The pass loop: rounds of passes until samples, time or the caller end it; nothing here depends on which integrators
+// exist.
 #pragma once
 
 #include <atomic>
@@ -29,11 +30,11 @@ struct Progress {
 
 struct RenderResult {
   std::shared_ptr<const Estimates> estimates;
-  Rgb<float> image;                        // the headline
-  std::optional<Plane<float>> alpha;       // with a transparent background
+  Rgb<float> image;                   // the headline
+  std::optional<Plane<float>> alpha;  // with a transparent background
   StopReason reason = StopReason::Samples;
   uint64_t rounds = 0;
-  double seconds = 0;                      // of the pass loop
+  double seconds = 0;  // of the pass loop
   uint64_t paths = 0, rays = 0, shadowRays = 0;
   uint64_t rejected = 0;
   // One rejected sample, if any, so that its path can be replayed.
@@ -53,8 +54,10 @@ class Session {
   // Called after each round; return false to end the render (what is done is kept).
   using ProgressCallback = std::function<bool(const Progress&)>;
 
-  // Runs the plan. `cancel`: set by a signal handler or another thread; the pass in flight is finished. `abandon`: the pass in flight is dropped.
-  RenderResult run(const ProgressCallback& progress = {}, const std::atomic<bool>* cancel = nullptr, const std::atomic<bool>* abandon = nullptr);
+  // Runs the plan. `cancel`: set by a signal handler or another thread; the pass in flight is finished. `abandon`: the
+  // pass in flight is dropped.
+  RenderResult run(const ProgressCallback& progress = {}, const std::atomic<bool>* cancel = nullptr,
+                   const std::atomic<bool>* abandon = nullptr);
 
   const Plan& plan() const { return plan_; }
   const TransportContext& context() const { return context_; }

@@ -16,23 +16,23 @@ namespace braid {
 enum class PixelFilter { Box, Gaussian, BlackmanHarris };
 
 struct Settings {
-  int width = 1280, height = 720;       // full frame, pixels
+  int width = 1280, height = 720;  // full frame, pixels
   std::optional<PixelWindow> crop;
   std::vector<std::string> integrators{"pt"};
-  uint64_t spp = 64;                    // passes of each integrator; 0: no limit
-  double seconds = 0;                   // wall-clock limit of the pass loop; 0: none
-  int maxDepth = 32;                    // segments of a path, the one from the camera included
+  uint64_t spp = 64;   // passes of each integrator; 0: no limit
+  double seconds = 0;  // wall-clock limit of the pass loop; 0: none
+  int maxDepth = 32;   // segments of a path, the one from the camera included
   uint64_t seed = 0;
   SamplerKind sampler = SamplerKind::Sobol;
   PixelFilter filter = PixelFilter::Box;
   LightStrategy lightStrategy = LightStrategy::Automatic;
-  bool features = true;                 // albedo, normal, depth, visibility
+  bool features = true;  // albedo, normal, depth, visibility
   bool quarters = false;
-  bool transparent = false;             // camera rays that miss: no radiance, alpha 0
-  std::optional<Spectrum> background;   // what camera rays that miss see instead of the environment
-  float clamp = 0;                      // largest channel of one path's radiance; 0: off (unbiased)
-  bool full = false;                    // leave nothing out
-  int threads = 0;                      // 0: all that the process may use
+  bool transparent = false;            // camera rays that miss: no radiance, alpha 0
+  std::optional<Spectrum> background;  // what camera rays that miss see instead of the environment
+  float clamp = 0;                     // largest channel of one path's radiance; 0: off (unbiased)
+  bool full = false;                   // leave nothing out
+  int threads = 0;                     // 0: all that the process may use
 };
 
 }  // namespace braid

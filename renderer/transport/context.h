@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every integrator needs besides the scene: the light sampler and the lobes of each material, built once per render.
+// What every integrator needs besides the scene: the light sampler and the lobes of each material, built once per
+// render.
 #pragma once
 
 #include <vector>
@@ -27,8 +28,10 @@ struct TransportContext {
   LightSampler lights;
   std::vector<MaterialSummary> materials;
 
-  explicit TransportContext(const Scene& s, LightStrategy strategy = LightStrategy::Automatic) : scene(s), lights(s, strategy) {
-    for (const Material& m : s.materials()) materials.push_back({materialLobes(m), m.emissive(), m.unlit, m.hasVolume()});
+  explicit TransportContext(const Scene& s, LightStrategy strategy = LightStrategy::Automatic)
+      : scene(s), lights(s, strategy) {
+    for (const Material& m : s.materials())
+      materials.push_back({materialLobes(m), m.emissive(), m.unlit, m.hasVolume()});
   }
   const MaterialSummary& summaryOf(const Hit& hit) const { return materials[hit.mesh->material]; }
 };

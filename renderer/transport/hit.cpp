@@ -20,8 +20,8 @@ Vec3 mapNormal(const Vec4& texel, float scale) {
   return length > 0 && std::isfinite(length) ? n / length : Vec3(0, 0, 1);
 }
 
-// The cross product of a triangle's edges as a unit vector. That of a 10⁻⁸ m triangle underflows when squared, so small ones are scaled first;
-// `fallback` when it is zero.
+// The cross product of a triangle's edges as a unit vector. That of a 10⁻⁸ m triangle underflows when squared, so small
+// ones are scaled first; `fallback` when it is zero.
 Vec3 unitNormal(const Vec3& n, const Vec3& fallback) {
   const float length2 = glm::dot(n, n);
   if (length2 > 1e-30f && length2 < 1e30f) return n * (1 / std::sqrt(length2));
@@ -56,8 +56,8 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
 
   const Vec3 a = w * p0, b = u * p1, c = v * p2;
   hit.position = a + b + c;
-  // TRAP: the bound must not be taken coordinate by coordinate: on the plane z = 0 it would be 0, yet Embree's distance to that plane has the
-  // rounding errors of the triangle's other coordinates in it.
+  // TRAP: the bound must not be taken coordinate by coordinate: on the plane z = 0 it would be 0, yet Embree's distance
+  // to that plane has the rounding errors of the triangle's other coordinates in it.
   const Vec3 largest3 = glm::max(glm::max(glm::abs(p0), glm::abs(p1)), glm::abs(p2));
   hit.positionError = gammaBound(8) * maxComponent(largest3);
   Vec3 ng = glm::cross(p1 - p0, p2 - p0);
@@ -69,7 +69,8 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
     const Mat3 linear(instance.toWorld);
     const Mat3 absolute(glm::abs(linear[0]), glm::abs(linear[1]), glm::abs(linear[2]));
     const Vec3 translation(instance.toWorld[3]);
-    const Vec3 rounding = (1 + gammaBound(3)) * (absolute * Vec3(hit.positionError)) + gammaBound(4) * (absolute * glm::abs(hit.position) + glm::abs(translation));
+    const Vec3 rounding = (1 + gammaBound(3)) * (absolute * Vec3(hit.positionError)) +
+                          gammaBound(4) * (absolute * glm::abs(hit.position) + glm::abs(translation));
     hit.positionError = maxComponent(rounding);
     hit.position = linear * hit.position + translation;
     // Normals go by the inverse transpose; that keeps the front side also in a mirrored instance.
@@ -97,7 +98,8 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
   } else {
     Frame frame = tangentFrame(ns, tangent);
     if (material.normalTexture) {
-      const Vec3 local = mapNormal(scene.lookup(material.normalTexture, mesh, query.triangle, u, v), material.normalScale);
+      const Vec3 local =
+          mapNormal(scene.lookup(material.normalTexture, mesh, query.triangle, u, v), material.normalScale);
       // Shading must stay consistent with geometry: a mapped normal below the surface would mirror light into it.
       const Vec3 mapped = frame.toWorld(local);
       if (glm::dot(mapped, ng) > 1e-3f) frame = tangentFrame(glm::normalize(mapped), Vec4(frame.s, tangent.w));
@@ -132,7 +134,8 @@ Spectrum baseColorAt(const Scene& scene, const Hit& hit) {
   const Material& m = *hit.material;
   Spectrum color = m.baseColor;
   if (m.baseColorTexture) color *= Spectrum(scene.lookup(m.baseColorTexture, *hit.mesh, hit.triangle, hit.u, hit.v));
-  if (!hit.mesh->colors.empty()) color *= Spectrum(interpolate(hit.mesh->colors, hit.mesh->triangles[hit.triangle], hit.u, hit.v));
+  if (!hit.mesh->colors.empty())
+    color *= Spectrum(interpolate(hit.mesh->colors, hit.mesh->triangles[hit.triangle], hit.u, hit.v));
   return color;
 }
 
@@ -143,13 +146,17 @@ void evaluateLayers(const Scene& scene, const Hit& hit, SurfaceParameters& s) {
   const auto tex = [&](const TextureRef& ref) { return scene.lookup(ref, *hit.mesh, hit.triangle, hit.u, hit.v); };
   if (s.lobes & kLobeClearcoat) {
     s.clearcoat = m.clearcoat * (m.clearcoatTexture ? tex(m.clearcoatTexture).r : 1.0f);
-    s.clearcoatRoughness = m.clearcoatRoughness * (m.clearcoatRoughnessTexture ? tex(m.clearcoatRoughnessTexture).g : 1.0f);
+    s.clearcoatRoughness =
+        m.clearcoatRoughness * (m.clearcoatRoughnessTexture ? tex(m.clearcoatRoughnessTexture).g : 1.0f);
     Vec3 coat = hit.smoothNormal;
     if (m.clearcoatNormalTexture && !hit.mesh->tangents.empty()) {
-      const Frame smooth(hit.frame.s - hit.smoothNormal * glm::dot(hit.frame.s, hit.smoothNormal), Vec3(0), hit.smoothNormal);
+      const Frame smooth(hit.frame.s - hit.smoothNormal * glm::dot(hit.frame.s, hit.smoothNormal), Vec3(0),
+                         hit.smoothNormal);
       const Vec3 t = glm::normalize(smooth.s);
-      const Vec3 bitangent = glm::cross(hit.smoothNormal, t) * (glm::dot(glm::cross(hit.frame.n, hit.frame.s), hit.frame.t) < 0 ? -1.0f : 1.0f);
-      const Vec3 mapped = Frame(t, bitangent, hit.smoothNormal).toWorld(mapNormal(tex(m.clearcoatNormalTexture), m.clearcoatNormalScale));
+      const Vec3 bitangent = glm::cross(hit.smoothNormal, t) *
+                             (glm::dot(glm::cross(hit.frame.n, hit.frame.s), hit.frame.t) < 0 ? -1.0f : 1.0f);
+      const Vec3 mapped = Frame(t, bitangent, hit.smoothNormal)
+                              .toWorld(mapNormal(tex(m.clearcoatNormalTexture), m.clearcoatNormalScale));
       if (glm::dot(mapped, hit.ng) > 1e-3f) coat = mapped;
     }
     s.clearcoatNormal = glm::normalize(hit.frame.toLocal(coat));
@@ -213,11 +220,14 @@ SurfaceParameters surfaceAt(const Scene& scene, const Hit& hit, uint32_t lobes, 
       s.roughness = 1 - (1 - m.roughness) * t.a;
     }
   }
-  if (lobes & kLobeTransmission) s.transmission = m.transmission * (m.transmissionTexture ? tex(m.transmissionTexture).r : 1.0f);
+  if (lobes & kLobeTransmission)
+    s.transmission = m.transmission * (m.transmissionTexture ? tex(m.transmissionTexture).r : 1.0f);
   if (lobes & kLobeDiffuseTransmission) {
-    s.diffuseTransmission = m.diffuseTransmission * (m.diffuseTransmissionTexture ? tex(m.diffuseTransmissionTexture).a : 1.0f);
+    s.diffuseTransmission =
+        m.diffuseTransmission * (m.diffuseTransmissionTexture ? tex(m.diffuseTransmissionTexture).a : 1.0f);
     s.diffuseTransmissionColor =
-        m.diffuseTransmissionColor * (m.diffuseTransmissionColorTexture ? Spectrum(tex(m.diffuseTransmissionColorTexture)) : Spectrum(1));
+        m.diffuseTransmissionColor *
+        (m.diffuseTransmissionColorTexture ? Spectrum(tex(m.diffuseTransmissionColorTexture)) : Spectrum(1));
   }
   if (lobes & (kLobeClearcoat | kLobeSheen | kLobeAnisotropy | kLobeIridescence)) evaluateLayers(scene, hit, s);
   return s;

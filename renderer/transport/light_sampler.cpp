@@ -22,14 +22,16 @@ LightBounds boundsOf(const EmissiveTriangle& e) {
 
 float punctualPower(const PunctualLight& light) {
   const float intensity = average(light.intensity);
-  return light.kind == PunctualKind::Point ? 4 * kPi * intensity : 2 * kPi * (1 - std::cos(light.outerConeAngle)) * intensity;
+  return light.kind == PunctualKind::Point ? 4 * kPi * intensity
+                                           : 2 * kPi * (1 - std::cos(light.outerConeAngle)) * intensity;
 }
 
 LightBounds boundsOf(const PunctualLight& light) {
   LightBounds b;
   b.bounds.extend(light.position);
   b.axis = light.direction;
-  // A point light has normals everywhere; a spot only within its cone. Power as if the cone were a full sphere: importance is per direction.
+  // A point light has normals everywhere; a spot only within its cone. Power as if the cone were a full sphere:
+  // importance is per direction.
   b.power = 4 * kPi * average(light.intensity);
   b.cosNormals = light.kind == PunctualKind::Point ? -1.0f : std::cos(light.outerConeAngle);
   b.cosEmission = light.kind == PunctualKind::Point ? 0.0f : std::cos(0.01f);
@@ -40,7 +42,8 @@ std::vector<float> cumulativeOf(std::vector<double> weight) {
   std::vector<float> cumulative(weight.size() + 1, 0.0f);
   double total = 0;
   for (double w : weight) total += w;
-  // TRAP: a share below the resolution of a float would be 0 and a dim point light beside a very bright one never chosen.
+  // TRAP: a share below the resolution of a float would be 0 and a dim point light beside a very bright one never
+  // chosen.
   for (double& w : weight)
     if (w > 0) w = std::max(w, total * 0x1p-20);
   total = 0;
@@ -86,7 +89,8 @@ LightSampler::LightSampler(const Scene& scene, LightStrategy strategy) : scene_(
   for (uint32_t i = 0; i < scene.lights().size(); ++i)
     (scene.lights()[i].kind == PunctualKind::Directional ? directional_ : positional_).push_back(i);
   finite_ = emitters.size() + positional_.size();
-  hierarchy_ = strategy == LightStrategy::Hierarchy || (strategy == LightStrategy::Automatic && hierarchyPays(emitters.size(), positional_.size()));
+  hierarchy_ = strategy == LightStrategy::Hierarchy ||
+               (strategy == LightStrategy::Automatic && hierarchyPays(emitters.size(), positional_.size()));
 
   double finitePower = 0;
   std::vector<double> powers;
@@ -110,10 +114,13 @@ LightSampler::LightSampler(const Scene& scene, LightStrategy strategy) : scene_(
   }
   directionalCumulative_ = cumulativeOf(irradiances);
 
-  // Categories: half by the irradiance they would give unoccluded, half evenly, so that no category starves where the others are hidden.
+  // Categories: half by the irradiance they would give unoccluded, half evenly, so that no category starves where the
+  // others are hidden.
   const double radius = static_cast<double>(scene.traits().radius);
-  const double environmentIrradiance = scene.environment() ? static_cast<double>(kPi * average(scene.environment()->average())) : 0.0;
-  const double share[3] = {finitePower / (4 * static_cast<double>(kPi) * radius * radius), directionalIrradiance, environmentIrradiance};
+  const double environmentIrradiance =
+      scene.environment() ? static_cast<double>(kPi * average(scene.environment()->average())) : 0.0;
+  const double share[3] = {finitePower / (4 * static_cast<double>(kPi) * radius * radius), directionalIrradiance,
+                           environmentIrradiance};
   const double total = share[0] + share[1] + share[2];
   const int active = (share[0] > 0) + (share[1] > 0) + (share[2] > 0);
   if (active == 0 || !(total > 0) || !std::isfinite(total)) return;
@@ -124,7 +131,8 @@ LightSampler::LightSampler(const Scene& scene, LightStrategy strategy) : scene_(
   }
 }
 
-bool LightSampler::sampleEmitter(const EmissiveTriangle& e, const Vec3& p, const Vec3& n, bool twoSided, Vec2 u, LightSample& out) const {
+bool LightSampler::sampleEmitter(const EmissiveTriangle& e, const Vec3& p, const Vec3& n, bool twoSided, Vec2 u,
+                                 LightSample& out) const {
   // Uniform by area (Heitz 2019: a low-distortion map of the square to the triangle).
   const bool upper = u.y > u.x;
   const float half = 0.5f * select(upper, u.x, u.y);
@@ -165,7 +173,8 @@ bool LightSampler::samplePunctual(const PunctualLight& light, const Vec3& p, Lig
 bool LightSampler::sample(const Vec3& p, const Vec3& n, bool twoSided, float uSelect, Vec2 u, LightSample& out) const {
   if (uSelect < probabilityFinite_) {
     float select = std::min(uSelect / probabilityFinite_, kOneMinusEpsilon), probability = 0;
-    const size_t light = hierarchy_ ? tree_.sample(p, n, twoSided, select, probability) : pick(cumulative_, select, probability);
+    const size_t light =
+        hierarchy_ ? tree_.sample(p, n, twoSided, select, probability) : pick(cumulative_, select, probability);
     if (!(probability > 0)) return false;
     const size_t emitters = scene_.emitters().size();
     const bool ok = light < emitters ? sampleEmitter(scene_.emitters()[light], p, n, twoSided, u, out)
@@ -174,7 +183,8 @@ bool LightSampler::sample(const Vec3& p, const Vec3& n, bool twoSided, float uSe
     return ok && out.pdfW > 0;
   }
   if (uSelect < probabilityFinite_ + probabilityDirectional_) {
-    float select = std::clamp((uSelect - probabilityFinite_) / probabilityDirectional_, 0.0f, kOneMinusEpsilon), probability = 0;
+    float select = std::clamp((uSelect - probabilityFinite_) / probabilityDirectional_, 0.0f, kOneMinusEpsilon),
+          probability = 0;
     const PunctualLight& light = scene_.lights()[directional_[pick(directionalCumulative_, select, probability)]];
     out.wi = -light.direction;
     out.distance = kInfinity;
@@ -197,7 +207,8 @@ float LightSampler::finiteProbability(const Vec3& p, const Vec3& n, bool twoSide
   return cumulative_[light + 1] - cumulative_[light];
 }
 
-float LightSampler::pdfEmitter(const Vec3& p, const Vec3& n, bool twoSided, size_t index, float distance, float cosLight) const {
+float LightSampler::pdfEmitter(const Vec3& p, const Vec3& n, bool twoSided, size_t index, float distance,
+                               float cosLight) const {
   if (probabilityFinite_ == 0) return 0;
   const float pdf = sqr(distance) / (cosLight * scene_.emitters()[index].area);
   const float choice = finiteProbability(p, n, twoSided, index) * probabilityFinite_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Next-event estimation: picks a light and a point or direction on it. Lights are numbered: emissive triangles first, then punctual lights with
-// a position; directional lights and the environment are separate categories.
+// Next-event estimation: picks a light and a point or direction on it. Lights are numbered: emissive triangles first,
+// then punctual lights with a position; directional lights and the environment are separate categories.
 #pragma once
 
 #include <vector>
@@ -12,18 +12,19 @@
 namespace braid {
 
 struct LightSample {
-  Vec3 wi;                // unit, from the shading point to the light
-  float distance = 0;     // metres; infinity for directional lights and the environment
-  Spectrum radiance{0};   // arriving along wi, before visibility. Delta lights: already divided by distance²
-  float pdfW = 0;         // density per solid angle including the choice of the light; for delta lights the probability of the choice
+  Vec3 wi;               // unit, from the shading point to the light
+  float distance = 0;    // metres; infinity for directional lights and the environment
+  Spectrum radiance{0};  // arriving along wi, before visibility. Delta lights: already divided by distance²
+  float pdfW =
+      0;  // density per solid angle including the choice of the light; for delta lights the probability of the choice
   bool delta = false;
 };
 
 // How finite lights are chosen.
 enum class LightStrategy { Automatic, Power, Hierarchy };
 
-// Whether a light hierarchy is worth its cost: not for up to 8 emissive triangles (a few area lights), where choosing by power is as good or better; yes as
-// soon as distances and cones of several lights differ from point to point.
+// Whether a light hierarchy is worth its cost: not for up to 8 emissive triangles (a few area lights), where choosing
+// by power is as good or better; yes as soon as distances and cones of several lights differ from point to point.
 bool hierarchyPays(size_t emissiveTriangles, size_t positionalLights);
 
 class LightSampler {
@@ -31,10 +32,12 @@ class LightSampler {
   // Automatic: see hierarchyPays().
   LightSampler(const Scene& scene, LightStrategy strategy);
 
-  // Samples a light for the point p with shading normal n (not zero unless twoSided); `twoSided`: the surface transmits. False: no light can contribute.
+  // Samples a light for the point p with shading normal n (not zero unless twoSided); `twoSided`: the surface
+  // transmits. False: no light can contribute.
   bool sample(const Vec3& p, const Vec3& n, bool twoSided, float uSelect, Vec2 u, LightSample& out) const;
 
-  // Density with which sample() would pick the direction to a point hit on emitter `index` (distance in metres, cosine at the light > 0).
+  // Density with which sample() would pick the direction to a point hit on emitter `index` (distance in metres, cosine
+  // at the light > 0).
   float pdfEmitter(const Vec3& p, const Vec3& n, bool twoSided, size_t index, float distance, float cosLight) const;
   float pdfEnvironment(const Vec3& direction) const;
 
@@ -43,7 +46,8 @@ class LightSampler {
   size_t bytes() const { return tree_.bytes() + cumulative_.size() * sizeof(float); }
 
  private:
-  bool sampleEmitter(const EmissiveTriangle& e, const Vec3& p, const Vec3& n, bool twoSided, Vec2 u, LightSample& out) const;
+  bool sampleEmitter(const EmissiveTriangle& e, const Vec3& p, const Vec3& n, bool twoSided, Vec2 u,
+                     LightSample& out) const;
   bool samplePunctual(const PunctualLight& light, const Vec3& p, LightSample& out) const;
   float finiteProbability(const Vec3& p, const Vec3& n, bool twoSided, size_t light) const;
 
@@ -51,8 +55,8 @@ class LightSampler {
   size_t finite_ = 0;
   bool hierarchy_ = false;
   LightTree tree_;
-  std::vector<float> cumulative_;        // by power, when there is no hierarchy
-  std::vector<uint32_t> positional_;     // punctual lights with a position
+  std::vector<float> cumulative_;     // by power, when there is no hierarchy
+  std::vector<uint32_t> positional_;  // punctual lights with a position
   std::vector<uint32_t> directional_;
   std::vector<float> directionalCumulative_;
   float probabilityFinite_ = 0, probabilityDirectional_ = 0, probabilityEnvironment_ = 0;

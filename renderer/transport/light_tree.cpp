@@ -48,11 +48,13 @@ LightBounds merge(const LightBounds& a, const LightBounds& b) {
 
 // Surface area orientation heuristic (Conty Estevez and Kulla 2018, Eq. 1).
 float splitCost(const LightBounds& b, const Vec3& parentDiagonal, int dimension) {
-  const float normals = std::acos(std::clamp(b.cosNormals, -1.0f, 1.0f)), emission = std::acos(std::clamp(b.cosEmission, -1.0f, 1.0f));
+  const float normals = std::acos(std::clamp(b.cosNormals, -1.0f, 1.0f)),
+              emission = std::acos(std::clamp(b.cosEmission, -1.0f, 1.0f));
   const float w = std::min(normals + emission, kPi);
   const float sinNormals = std::sin(normals);
-  const float orientation = 2 * kPi * (1 - b.cosNormals) +
-                            0.5f * kPi * (2 * w * sinNormals - std::cos(normals - 2 * w) - 2 * normals * sinNormals + b.cosNormals);
+  const float orientation =
+      2 * kPi * (1 - b.cosNormals) +
+      0.5f * kPi * (2 * w * sinNormals - std::cos(normals - 2 * w) - 2 * normals * sinNormals + b.cosNormals);
   const float longest = maxComponent(parentDiagonal);
   const float regular = longest / std::max(parentDiagonal[dimension], longest * 1e-6f);
   const Vec3 d = b.bounds.diagonal();
@@ -60,7 +62,8 @@ float splitCost(const LightBounds& b, const Vec3& parentDiagonal, int dimension)
   return b.power * orientation * regular * area;
 }
 
-// The share of the left one of two nodes. A node that may contribute keeps a chance worth a float's digits: the other, however bright, may be hidden.
+// The share of the left one of two nodes. A node that may contribute keeps a chance worth a float's digits: the other,
+// however bright, may be hidden.
 float leftProbability(float left, float right) {
   constexpr float kLeast = 0x1p-10f;
   const float p = left / (left + right);
@@ -81,7 +84,8 @@ void LightTree::build(const std::vector<LightBounds>& lights) {
   for (uint32_t i = 0; i < order.size(); ++i) position_[order[i]] = i;
 }
 
-LightBounds LightTree::buildNode(std::vector<uint32_t>& order, size_t begin, size_t end, size_t node, const std::vector<LightBounds>& lights, int depth) {
+LightBounds LightTree::buildNode(std::vector<uint32_t>& order, size_t begin, size_t end, size_t node,
+                                 const std::vector<LightBounds>& lights, int depth) {
   const size_t count = end - begin;
   LightBounds total;
   size_t middle = begin;
@@ -126,8 +130,9 @@ LightBounds LightTree::buildNode(std::vector<uint32_t>& order, size_t begin, siz
       }
     }
     if (bestDimension >= 0) {
-      const auto split = std::partition(order.begin() + static_cast<ptrdiff_t>(begin), order.begin() + static_cast<ptrdiff_t>(end),
-                                        [&](uint32_t light) { return bucketOf(light, bestDimension) <= bestSplit; });
+      const auto split =
+          std::partition(order.begin() + static_cast<ptrdiff_t>(begin), order.begin() + static_cast<ptrdiff_t>(end),
+                         [&](uint32_t light) { return bucketOf(light, bestDimension) <= bestSplit; });
       middle = static_cast<size_t>(split - order.begin());
     }
     if (middle == begin || middle == end) middle = begin + count / 2;
@@ -168,13 +173,18 @@ float LightTree::importance(const Node& node, const Vec3& p, const Vec3& n, bool
   const float sin2Bound = radius2 / distance2;
   const float sinBound = std::sqrt(sin2Bound), cosBound = safeSqrt(1 - sin2Bound);
   // cos(max(0, a - b)) for angles given by cosine and sine.
-  const auto cosMinus = [](float sinA, float cosA, float sinB, float cosB) { return cosA > cosB ? 1.0f : cosA * cosB + sinA * sinB; };
-  const auto sinMinus = [](float sinA, float cosA, float sinB, float cosB) { return cosA > cosB ? 0.0f : sinA * cosB - cosA * sinB; };
+  const auto cosMinus = [](float sinA, float cosA, float sinB, float cosB) {
+    return cosA > cosB ? 1.0f : cosA * cosB + sinA * sinB;
+  };
+  const auto sinMinus = [](float sinA, float cosA, float sinB, float cosB) {
+    return cosA > cosB ? 0.0f : sinA * cosB - cosA * sinB;
+  };
 
   float cosAxis = glm::dot(node.axis, w);
   if (node.twoSided) cosAxis = std::abs(cosAxis);
   const float sinAxis = safeSqrt(1 - sqr(cosAxis)), sinNormals = safeSqrt(1 - sqr(node.cosNormals));
-  const float cosX = cosMinus(sinAxis, cosAxis, sinNormals, node.cosNormals), sinX = sinMinus(sinAxis, cosAxis, sinNormals, node.cosNormals);
+  const float cosX = cosMinus(sinAxis, cosAxis, sinNormals, node.cosNormals),
+              sinX = sinMinus(sinAxis, cosAxis, sinNormals, node.cosNormals);
   const float cosEmit = cosMinus(sinX, cosX, sinBound, cosBound);
   if (cosEmit <= node.cosEmission) return 0;
   // Slack on both cosines: rounding must not turn a light that contributes a little into one that is never chosen.

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// A hierarchy over finite lights that picks one in logarithmic time, by an upper bound of what each node can send to the shading point.
+// A hierarchy over finite lights that picks one in logarithmic time, by an upper bound of what each node can send to
+// the shading point.
 //
-// Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting" (2018), with the importance of Pharr et al. 2023,
-// section 12.6.3; the clamp of the distance uses the squared node radius, so that the choice does not depend on the unit of length.
+// Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting" (2018), with the
+// importance of Pharr et al. 2023, section 12.6.3; the clamp of the distance uses the squared node radius, so that the
+// choice does not depend on the unit of length.
 #pragma once
 
 #include <cstdint>
@@ -27,8 +29,8 @@ class LightTree {
   void build(const std::vector<LightBounds>& lights);
   bool empty() const { return nodes_.empty(); }
 
-  // Picks a light for the point p with normal n (zero: no receiver cosine; `twoSided`: both sides of n receive). u is rescaled to a fresh variate. Returns
-  // the light and its probability; probability 0: nothing can contribute.
+  // Picks a light for the point p with normal n (zero: no receiver cosine; `twoSided`: both sides of n receive). u is
+  // rescaled to a fresh variate. Returns the light and its probability; probability 0: nothing can contribute.
   uint32_t sample(const Vec3& p, const Vec3& n, bool twoSided, float& u, float& probability) const;
   float probability(const Vec3& p, const Vec3& n, bool twoSided, uint32_t light) const;
 
@@ -46,10 +48,11 @@ class LightTree {
     bool twoSided;
   };
   float importance(const Node& node, const Vec3& p, const Vec3& n, bool twoSided) const;
-  LightBounds buildNode(std::vector<uint32_t>& order, size_t begin, size_t end, size_t node, const std::vector<LightBounds>& lights, int depth);
+  LightBounds buildNode(std::vector<uint32_t>& order, size_t begin, size_t end, size_t node,
+                        const std::vector<LightBounds>& lights, int depth);
 
-  std::vector<Node> nodes_;          // depth first: left child at +1, right child at +2·leftLeaves
-  std::vector<uint32_t> position_;   // of each light among the leaves
+  std::vector<Node> nodes_;         // depth first: left child at +1, right child at +2·leftLeaves
+  std::vector<uint32_t> position_;  // of each light among the leaves
 };
 
 }  // namespace braid

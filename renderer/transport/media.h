@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The solids that a path is inside of. Where solids overlap, the one with the higher refractive index rules (ties: the later material), so that
-// every interface is seen alike from both sides; the surface of a ruled solid inside a ruling one is no interface and lets rays pass
-// straight through. This is the priority scheme of Schmidt and Budge 2002 with priorities taken from the index.
+// The solids that a path is inside of. Where solids overlap, the one with the higher refractive index rules (ties: the
+// later material), so that every interface is seen alike from both sides; the surface of a ruled solid inside a ruling
+// one is no interface and lets rays pass straight through. This is the priority scheme of Schmidt and Budge 2002 with
+// priorities taken from the index.
 #pragma once
 
 #include <cstdint>
@@ -50,7 +51,8 @@ class MediaStack {
   int count_ = 0;
 };
 
-// Beer-Lambert transmittance over a distance in metres (KHR_materials_volume: attenuationColor after attenuationDistance).
+// Beer-Lambert transmittance over a distance in metres (KHR_materials_volume: attenuationColor after
+// attenuationDistance).
 inline Spectrum volumeTransmittance(const Material& m, float distance) {
   if (!(m.attenuationDistance < kInfinity) || m.attenuationColor == Spectrum(1)) return Spectrum(1);
   const float x = distance / m.attenuationDistance;

@@ -4,7 +4,8 @@
 
 namespace braid {
 
-// Power heuristic with exponent 2 for the technique with density `pdf` against one other; the ratio form does not overflow.
+// Power heuristic with exponent 2 for the technique with density `pdf` against one other; the ratio form does not
+// overflow.
 inline float powerHeuristic(float pdf, float otherPdf) {
   if (!(pdf > 0)) return 0;
   const float ratio = otherPdf / pdf;

@@ -8,17 +8,18 @@
 
 namespace braid {
 
-// Which lobes a surface has. Anything not set is left out: no sampling, no evaluation, and its parameters may stay uninitialised.
+// Which lobes a surface has. Anything not set is left out: no sampling, no evaluation, and its parameters may stay
+// uninitialised.
 enum LobeFlags : uint32_t {
-  kLobeDiffuse = 1u << 0,              // Lambertian reflection (1 - metallic)(1 - transmission)(1 - diffuseTransmission)
+  kLobeDiffuse = 1u << 0,  // Lambertian reflection (1 - metallic)(1 - transmission)(1 - diffuseTransmission)
   kLobeDiffuseTransmission = 1u << 1,  // Lambertian transmission
   kLobeSpecular = 1u << 2,             // GGX reflection, dielectric and metal
   kLobeTransmission = 1u << 3,         // GGX refraction, or straight-through when thin-walled
   kLobeClearcoat = 1u << 4,
   kLobeSheen = 1u << 5,
-  kLobeIridescence = 1u << 6,          // modifies the specular Fresnel term
-  kLobeAnisotropy = 1u << 7,           // modifies the specular distribution
-  kLobeSpecularGlossiness = 1u << 8,   // dielectric F0 given directly (specularF0), metallic is 0
+  kLobeIridescence = 1u << 6,         // modifies the specular Fresnel term
+  kLobeAnisotropy = 1u << 7,          // modifies the specular distribution
+  kLobeSpecularGlossiness = 1u << 8,  // dielectric F0 given directly (specularF0), metallic is 0
 };
 
 struct SurfaceParameters {
@@ -34,7 +35,7 @@ struct SurfaceParameters {
 
   float specular = 1;
   Spectrum specularColor{1};
-  Spectrum specularF0{0};   // only with kLobeSpecularGlossiness
+  Spectrum specularF0{0};  // only with kLobeSpecularGlossiness
 
   float transmission = 0;
   float diffuseTransmission = 0;
