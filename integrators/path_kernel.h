@@ -38,7 +38,7 @@ class PathObserver {
 };
 
 // Traces many paths in step: all find their next surface, then all are shaded, then all shadow rays run. Shading one
-// path does not wait for another's memory or divisions, which a path followed alone would (1.4x the speed); the result
+// path does not wait for another's memory or divisions, which a path followed alone would; the result
 // of a path does not depend on its companions.
 class PathKernel {
  public:

@@ -22,7 +22,7 @@ using Bytes = std::span<const uint8_t>;
 struct Buffer {
   Bytes data;
   std::vector<uint8_t> owned;    // empty for the binary chunk of a GLB, which stays in the file's bytes
-  bool meshoptFallback = false;  // a placeholder without data
+  bool meshoptFallback = false;  // holds no data; every view of it is compressed elsewhere
 };
 
 enum class MeshoptMode : uint8_t { Attributes, Triangles, Indices };
