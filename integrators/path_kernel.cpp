@@ -67,10 +67,7 @@ bool PathKernel::crossNullInterface(PathState& path, const Hit& hit) const {
   const uint32_t material = hit.mesh->material;
   const int64_t other = path.media.ruling(scene_.materials(), hit.front ? -1 : static_cast<int64_t>(material));
   if (other < 0 || !MediaStack::outranks(scene_.materials(), other, static_cast<int64_t>(material))) return false;
-  if (hit.front)
-    path.media.enter(material);
-  else
-    path.media.leave(material);
+  path.media.cross(material, hit.front);
   path.origin = offsetOrigin(hit, path.direction);
   path.featureDistance += hit.distance;
   path.lightCouldNotBeSampled = true;  // a shadow ray stops at the interface
@@ -137,11 +134,11 @@ bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Bsdf& 
     shadow.ray.direction = hit.position + light.wi * light.distance - shadow.ray.origin;
     shadow.ray.tmax = kShadowLength;
   }
-  shadow.ray.salt = mix32(path.salt ^ 0x51ed270bu);
+  shadow.ray.salt = mix32(path.salt ^ 0x51ed270bu) & ~kCameraRay;
   const bool volume = context_.summaryOf(hit).volume;
   if (!path.media.empty() || volume) {
     MediaStack media = path.media;
-    if (!reflects && volume) hit.front ? media.enter(hit.mesh->material) : media.leave(hit.mesh->material);
+    if (!reflects && volume) media.cross(hit.mesh->material, hit.front);
     const int64_t medium = media.ruling(scene_.materials());
     if (medium >= 0)
       shadow.contribution *= volumeTransmittance(scene_.materials()[static_cast<size_t>(medium)], light.distance);
@@ -162,7 +159,7 @@ bool PathKernel::scatter(PathState& path, const Hit& hit, const Bsdf& bsdf, bool
 
   if (sample.transmitted && hit.material->hasVolume()) {
     const int64_t before = path.media.ruling(scene_.materials());
-    hit.front ? path.media.enter(hit.mesh->material) : path.media.leave(hit.mesh->material);
+    path.media.cross(hit.mesh->material, hit.front);
     const int64_t after = path.media.ruling(scene_.materials());
     const auto index = [&](int64_t m) {
       return m < 0 ? 1.0f : std::max(scene_.materials()[static_cast<size_t>(m)].ior, 1e-3f);
@@ -203,6 +200,7 @@ void PathKernel::start(int x, int y, uint64_t key) {
   path.key = key;
   path.origin = ray.origin;
   path.direction = ray.direction;
+  path.media = cameraMedia_;
   path.segments = 1;
 }
 
@@ -223,7 +221,10 @@ void PathKernel::run() {
 }
 
 void PathKernel::queueRay(int slot, PathState& path) {
-  if (filtered_) path.salt = sampler_.salt(path.key, static_cast<uint32_t>(path.segments + path.nullCrossings));
+  if (filtered_) {
+    const uint32_t salt = sampler_.salt(path.key, static_cast<uint32_t>(path.segments + path.nullCrossings));
+    path.salt = (salt & ~kCameraRay) | (path.segments == 1 ? kCameraRay : 0);
+  }
   rays_.set(slot, {path.origin, path.direction, kInfinity, path.salt});
   if (observer_) observer_->onRay(path);
 }

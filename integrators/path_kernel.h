@@ -50,7 +50,10 @@ class PathKernel {
         sampler_(sampler),
         record_(record),
         wantFeatures_(plan.features),
-        filtered_(context.scene.accel().filtered()) {}
+        filtered_(context.scene.accel().filtered()) {
+    if (scene_.traits().has(kTraitVolume))
+      cameraMedia_ = mediaAround(scene_, plan.camera.position(), plan.camera.forward());
+  }
 
   // Starts a path through pixel (x, y) of the full frame with the random numbers of `key`. At most kBatch before a
   // run().
@@ -89,6 +92,7 @@ class PathKernel {
   std::vector<RecordedRay>* record_;
   PathObserver* observer_ = nullptr;
   bool wantFeatures_, filtered_;
+  MediaStack cameraMedia_;  // the solids that the camera is inside of
 
   int count_ = 0;
   std::array<PathState, kBatch> path_{};

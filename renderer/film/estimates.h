@@ -25,7 +25,16 @@ struct Estimate {
   Rgb<float> mean;
   Rgb<float> half[2];               // A, B
   std::vector<Rgb<float>> quarter;  // four, or none
-  Rgb<float> variance;              // of the mean
+  Rgb<float> variance;              // of the mean; empty when not known
+  // Of integrators that estimate their bias: the mean estimate and the variance of that mean; else empty.
+  Rgb<float> bias, biasVariance;
+};
+
+// The state of an estimate at an earlier time, for methods that look at convergence.
+struct Checkpoint {
+  uint64_t passes = 0;
+  double seconds = 0;
+  Rgb<float> variance;
 };
 
 // Mean, halves and variance of the mean of one set of feature planes.

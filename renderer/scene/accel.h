@@ -23,8 +23,11 @@ namespace braid {
 
 inline constexpr uint32_t kNoInstance = ~0u;
 
+// Bit of RayQuery::salt: a camera ray, the only kind that back faces of single-sided surfaces let pass.
+inline constexpr uint32_t kCameraRay = 1;
+
 // A ray; `direction` need not be unit, t is in units of its length. `salt` makes stochastic coverage differ between
-// rays.
+// rays; its lowest bit is kCameraRay.
 struct RayQuery {
   Vec3 origin, direction;
   float tmax = kInfinity;

@@ -32,6 +32,14 @@ std::optional<Vec2> Camera::project(const Vec3& point) const {
   return Vec2(0.5f * (x + 1) * width_, 0.5f * (1 - y) * height_);
 }
 
+double Camera::pixelPdf(const Vec3& d) const {
+  const double pixels = static_cast<double>(width_) * static_cast<double>(height_);
+  const double perArea = pixels / static_cast<double>(frameArea());
+  if (orthographic_) return perArea;
+  const double cosine = static_cast<double>(glm::dot(d, forward_));
+  return cosine > 0 ? perArea / (cosine * cosine * cosine) : 0.0;
+}
+
 Mat4 Camera::worldToCamera() const {
   Mat4 m(1);
   for (int i = 0; i < 3; ++i) m[i] = Vec4(right_[i], up_[i], -forward_[i], 0);

@@ -25,6 +25,10 @@ class Camera {
   // The raster position of a world point, or none behind the camera. Does not test against the frame.
   std::optional<Vec2> project(const Vec3& point) const;
 
+  // Density with which rays through one pixel, uniform on it, take the direction of the unit vector d: per steradian
+  // (perspective), or per m² on the sensor (orthographic). 0 behind the camera.
+  double pixelPdf(const Vec3& d) const;
+
   bool orthographic() const { return orthographic_; }
   Vec3 position() const { return position_; }
   Vec3 forward() const { return forward_; }

@@ -153,14 +153,14 @@ void Scene::appendEmitters(uint32_t meshIndex, const Mat4& toWorld) {
       e.mesh = meshIndex;
       e.triangle = static_cast<uint32_t>(t);
       e.twoSided = material.doubleSided;
-      e.textured = bool(material.emissiveTexture);
+      e.textured = bool(material.emissiveTexture) || material.alphaMode != AlphaMode::Opaque;
       e.meanRadiance = material.emission;
       if (e.textured) {
         // Centroid-like lattice of 28 points; only guides sampling, so a coarse mean is enough.
         Spectrum sum(0);
         for (int i = 0; i < 7; ++i)
           for (int j = 0; j < 7 - i; ++j)
-            sum += emission(mesh, e.triangle, (static_cast<float>(i) + 0.33f) / 7, (static_cast<float>(j) + 0.33f) / 7);
+            sum += coveredEmission(mesh, e.triangle, (static_cast<float>(i) + 0.33f) / 7, (static_cast<float>(j) + 0.33f) / 7);
         e.meanRadiance = sum / 28.0f;
       }
       if (e.area == 0) e.meanRadiance = Spectrum(0);
@@ -216,6 +216,10 @@ Spectrum Scene::emission(const TriangleMesh& mesh, uint32_t triangle, float u, f
   return m.emissiveTexture ? m.emission * Spectrum(lookup(m.emissiveTexture, mesh, triangle, u, v)) : m.emission;
 }
 
+Spectrum Scene::coveredEmission(const TriangleMesh& mesh, uint32_t triangle, float u, float v) const {
+  return emission(mesh, triangle, u, v) * alpha(mesh, triangle, u, v);
+}
+
 float Scene::alpha(const TriangleMesh& mesh, uint32_t triangle, float u, float v) const {
   const Material& m = material(mesh);
   if (m.alphaMode == AlphaMode::Opaque) return 1;
@@ -229,13 +233,15 @@ float Scene::alpha(const TriangleMesh& mesh, uint32_t triangle, float u, float v
 bool Scene::passThrough(uint32_t meshIndex, uint32_t triangle, float u, float v, bool backFace, uint32_t salt) const {
   const TriangleMesh& m = data_.meshes[meshIndex];
   const Material& mat = material(m);
-  if (backFace && !mat.doubleSided && !mat.transmissive() && mat.diffuseTransmission == 0) return true;
+  // TRAP: culling is one-way, so it must not take part in transport: light that passes a wall from behind could not be
+  // traced from the light, which meets the wall's front.
+  if (backFace && (salt & kCameraRay) && !mat.doubleSided && !mat.transmissive() && mat.diffuseTransmission == 0) return true;
   if (mat.alphaMode == AlphaMode::Opaque) return false;
   const float a = alpha(m, triangle, u, v);
   if (a <= 0) return true;
   if (a >= 1) return false;
   // Coverage decided once per ray and triangle: the same answer if Embree asks twice.
-  const uint32_t h = mix32(mix32(salt ^ (meshIndex * 0x9e3779b9u)) ^ triangle);
+  const uint32_t h = mix32(mix32((salt & ~kCameraRay) ^ (meshIndex * 0x9e3779b9u)) ^ triangle);
   return static_cast<float>(h >> 8) * 0x1p-24f >= a;
 }
 

@@ -54,6 +54,9 @@ class Scene : private HitFilter {
   // Radiance leaving an emissive surface at a uv-interpolated point of a triangle with barycentric weights (1-u-v, u,
   // v).
   Spectrum emission(const TriangleMesh& mesh, uint32_t triangle, float u, float v) const;
+  // emission() times alpha(): what a point chosen on the surface sends on average, for light sampling. A ray that hits
+  // the surface has already decided the coverage.
+  Spectrum coveredEmission(const TriangleMesh& mesh, uint32_t triangle, float u, float v) const;
   // Coverage of a surface point in [0,1] (alpha mode OPAQUE: 1).
   float alpha(const TriangleMesh& mesh, uint32_t triangle, float u, float v) const;
 

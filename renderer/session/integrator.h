@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "renderer/film/estimates.h"
 #include "renderer/film/film.h"
 #include "renderer/session/plan.h"
 #include "renderer/transport/context.h"
@@ -26,6 +27,11 @@ struct PassStatistics {
   std::atomic<int64_t> rejectedPixel{-1};  // y · frame width + x of one rejected sample
 };
 
+// What an integrator works out once per render and all its passes read, for instance which lights reach what is seen.
+struct Preparation {
+  virtual ~Preparation() = default;
+};
+
 struct PassRequest {
   const TransportContext& context;
   const Plan& plan;
@@ -33,6 +39,7 @@ struct PassRequest {
   const std::atomic<bool>* cancel = nullptr;  // checked per tile; a cancelled pass is discarded
   PassStatistics* statistics = nullptr;
   std::vector<std::vector<RecordedRay>>* record = nullptr;  // per tile, for benchmarks; usually null
+  const Preparation* preparation = nullptr;  // of prepare(); null: the pass prepares for itself
 };
 
 class Integrator {
@@ -42,6 +49,12 @@ class Integrator {
   virtual const char* description() const = 0;
   virtual bool unbiased() const { return true; }
   virtual bool splats() const { return false; }
+  // Whether pixels share their random numbers.
+  virtual Correlation correlation() const { return Correlation::Independent; }
+  // Whether it estimates the bias of its passes (PassTarget::bias).
+  virtual bool estimatesBias() const { return false; }
+  // A pure function of the plan and the scene; null when passes need nothing.
+  virtual std::shared_ptr<const Preparation> prepare(const TransportContext&, const Plan&) const { return nullptr; }
   virtual Applies applies(const SceneTraits& traits) const = 0;
   // Renders pass `request.pass` of the plan's window into the target. Returns false when cancelled.
   virtual bool renderPass(const PassRequest& request, PassTarget& target) const = 0;

@@ -68,6 +68,12 @@ RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bo
     for (const PlannedIntegrator& p : plan_.integrators) splats = splats || p.integrator->splats();
     PassTarget target(plan_.window.width(), plan_.window.height(), splats, plan_.features, plan_.settings.transparent);
     const Clock clock;
+    std::vector<std::shared_ptr<const Preparation>> preparations;
+    for (size_t i = 0; i < plan_.integrators.size(); ++i) {
+      const Clock preparing;
+      preparations.push_back(plan_.integrators[i].integrator->prepare(context_, plan_));
+      seconds_[i] += preparing.seconds();
+    }
     const auto isSet = [](const std::atomic<bool>* flag) { return flag && flag->load(); };
     for (;;) {
       if (settings.spp > 0 && result.rounds >= settings.spp) break;
@@ -82,7 +88,7 @@ RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bo
           const uint64_t pass = accumulators_[i].passes();
           target.clear();
           abandoned = !plan_.integrators[i].integrator->renderPass(
-              {context_, plan_, pass, abandon, &statistics, nullptr}, target);
+              {context_, plan_, pass, abandon, &statistics, nullptr, preparations[i].get()}, target);
           if (abandoned) break;
           const int64_t rejected = statistics.rejectedPixel.load();
           if (rejected >= 0 && !result.firstRejected)
@@ -138,6 +144,7 @@ std::shared_ptr<const Estimates> Session::snapshot() const {
     const Accumulator& a = accumulators_[i];
     Estimate estimate;
     estimate.name = plan_.integrators[i].integrator->name();
+    estimate.correlation = plan_.integrators[i].integrator->correlation();
     estimate.unbiased = plan_.integrators[i].integrator->unbiased();
     estimate.passes = a.passes();
     estimate.seconds = seconds_[i];

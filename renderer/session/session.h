@@ -62,8 +62,10 @@ class Session {
   const Plan& plan() const { return plan_; }
   const TransportContext& context() const { return context_; }
 
- private:
+  // The estimates so far; call it from the progress callback or after run().
   std::shared_ptr<const Estimates> snapshot() const;
+
+ private:
 
   const Scene& scene_;
   Plan plan_;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "renderer/transport/warp.h"
+
 namespace braid {
 
 namespace {
@@ -133,10 +135,8 @@ LightSampler::LightSampler(const Scene& scene, LightStrategy strategy) : scene_(
 
 bool LightSampler::sampleEmitter(const EmissiveTriangle& e, const Vec3& p, const Vec3& n, bool twoSided, Vec2 u,
                                  LightSample& out) const {
-  // Uniform by area (Heitz 2019: a low-distortion map of the square to the triangle).
-  const bool upper = u.y > u.x;
-  const float half = 0.5f * select(upper, u.x, u.y);
-  const float b1 = select(upper, half, u.x - half), b2 = select(upper, u.y - half, half);
+  const Vec2 b = squareToTriangle(u);
+  const float b1 = b.x, b2 = b.y;
   const Vec3 point = e.p0 + b1 * e.e1 + b2 * e.e2;
   const Vec3 d = point - p;
   const float distance2 = glm::dot(d, d);
@@ -150,7 +150,7 @@ bool LightSampler::sampleEmitter(const EmissiveTriangle& e, const Vec3& p, const
   const float inverse = 1 / out.distance;
   out.wi = d * inverse;
   cosLight *= inverse;
-  out.radiance = e.textured ? scene_.emission(scene_.mesh(e.mesh), e.triangle, b1, b2) : e.meanRadiance;
+  out.radiance = e.textured ? scene_.coveredEmission(scene_.mesh(e.mesh), e.triangle, b1, b2) : e.meanRadiance;
   out.pdfW = distance2 / (cosLight * e.area);
   out.delta = false;
   return out.pdfW > 0 && std::isfinite(out.pdfW);
@@ -176,6 +176,7 @@ bool LightSampler::sample(const Vec3& p, const Vec3& n, bool twoSided, float uSe
     const size_t light =
         hierarchy_ ? tree_.sample(p, n, twoSided, select, probability) : pick(cumulative_, select, probability);
     if (!(probability > 0)) return false;
+    out.light = static_cast<uint32_t>(light);
     const size_t emitters = scene_.emitters().size();
     const bool ok = light < emitters ? sampleEmitter(scene_.emitters()[light], p, n, twoSided, u, out)
                                      : samplePunctual(scene_.lights()[positional_[light - emitters]], p, out);
@@ -185,7 +186,9 @@ bool LightSampler::sample(const Vec3& p, const Vec3& n, bool twoSided, float uSe
   if (uSelect < probabilityFinite_ + probabilityDirectional_) {
     float select = std::clamp((uSelect - probabilityFinite_) / probabilityDirectional_, 0.0f, kOneMinusEpsilon),
           probability = 0;
-    const PunctualLight& light = scene_.lights()[directional_[pick(directionalCumulative_, select, probability)]];
+    const size_t index = pick(directionalCumulative_, select, probability);
+    const PunctualLight& light = scene_.lights()[directional_[index]];
+    out.light = firstDirectional() + static_cast<uint32_t>(index);
     out.wi = -light.direction;
     out.distance = kInfinity;
     out.radiance = light.intensity;
@@ -196,6 +199,7 @@ bool LightSampler::sample(const Vec3& p, const Vec3& n, bool twoSided, float uSe
   if (probabilityEnvironment_ == 0) return false;
   out.pdfW = scene_.environment()->sample(u, out.wi) * probabilityEnvironment_;
   if (!(out.pdfW > 0) || !std::isfinite(out.pdfW)) return false;
+  out.light = environmentLight();
   out.distance = kInfinity;
   out.radiance = scene_.environment()->radiance(out.wi);
   out.delta = false;
@@ -214,6 +218,19 @@ float LightSampler::pdfEmitter(const Vec3& p, const Vec3& n, bool twoSided, size
   const float choice = finiteProbability(p, n, twoSided, index) * probabilityFinite_;
   const float result = choice * pdf;
   return std::isfinite(result) ? result : 0.0f;
+}
+
+float LightSampler::pdfDirect(uint32_t light, const Vec3& p, const Vec3& n, bool twoSided, const Vec3& toLight) const {
+  if (light < finite_) {
+    if (probabilityFinite_ == 0) return 0;
+    const float choice = finiteProbability(p, n, twoSided, light) * probabilityFinite_;
+    return light < firstPositional() ? choice / scene_.emitters()[light].area : choice;
+  }
+  if (light < environmentLight()) {
+    const size_t i = light - finite_;
+    return (directionalCumulative_[i + 1] - directionalCumulative_[i]) * probabilityDirectional_;
+  }
+  return pdfEnvironment(toLight);
 }
 
 float LightSampler::pdfEnvironment(const Vec3& direction) const {

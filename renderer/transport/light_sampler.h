@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Next-event estimation: picks a light and a point or direction on it. Lights are numbered: emissive triangles first,
-// then punctual lights with a position; directional lights and the environment are separate categories.
+// then punctual lights with a position, directional lights, the environment.
 #pragma once
 
 #include <vector>
@@ -18,6 +18,7 @@ struct LightSample {
   float pdfW =
       0;  // density per solid angle including the choice of the light; for delta lights the probability of the choice
   bool delta = false;
+  uint32_t light = 0;  // number of the light, see LightSampler::size()
 };
 
 // How finite lights are chosen.
@@ -40,6 +41,22 @@ class LightSampler {
   // at the light > 0).
   float pdfEmitter(const Vec3& p, const Vec3& n, bool twoSided, size_t index, float distance, float cosLight) const;
   float pdfEnvironment(const Vec3& direction) const;
+
+  // Density with which sample() at a receiver picks a point of a light: per m² for emissive triangles, per solid angle
+  // about `toLight` for the environment, a probability for the others.
+  float pdfDirect(uint32_t light, const Vec3& p, const Vec3& n, bool twoSided, const Vec3& toLight) const;
+
+  // Lights in all, and where each kind begins in the numbering.
+  uint32_t size() const { return environmentLight() + (scene_.environment() ? 1u : 0u); }
+  uint32_t firstPositional() const { return static_cast<uint32_t>(scene_.emitters().size()); }
+  uint32_t firstDirectional() const { return static_cast<uint32_t>(finite_); }
+  uint32_t environmentLight() const { return static_cast<uint32_t>(finite_ + directional_.size()); }
+  const PunctualLight& positional(uint32_t light) const {
+    return scene_.lights()[positional_[light - firstPositional()]];
+  }
+  const PunctualLight& directional(uint32_t light) const {
+    return scene_.lights()[directional_[light - firstDirectional()]];
+  }
 
   size_t finiteLights() const { return finite_; }
   bool usesHierarchy() const { return hierarchy_; }

@@ -7,7 +7,7 @@
 
 #include <cstdint>
 
-#include "renderer/scene/material.h"
+#include "renderer/scene/scene.h"
 
 namespace braid {
 
@@ -18,14 +18,17 @@ class MediaStack {
   void enter(uint32_t material) {
     if (count_ < kCapacity) inside_[count_++] = material;
   }
-  void leave(uint32_t material) {
+  // False when the path was not inside of it.
+  bool leave(uint32_t material) {
     for (int i = count_; i-- > 0;) {
       if (inside_[i] != material) continue;
       for (int j = i; j + 1 < count_; ++j) inside_[j] = inside_[j + 1];
       --count_;
-      return;
+      return true;
     }
+    return false;
   }
+  void cross(uint32_t material, bool enters) { enters ? enter(material) : void(leave(material)); }
   // The ruling material, not counting one layer of `except`; -1: none.
   int64_t ruling(const std::vector<Material>& materials, int64_t except = -1) const {
     int64_t best = -1;
@@ -50,6 +53,10 @@ class MediaStack {
   uint32_t inside_[kCapacity] = {};
   int count_ = 0;
 };
+
+// The solids around a point that no surface lies between it and, found by following a ray to infinity: what is left
+// without having been entered was around the start. For cameras and lights inside of solids.
+MediaStack mediaAround(const Scene& scene, const Vec3& point, const Vec3& direction);
 
 // Beer-Lambert transmittance over a distance in metres (KHR_materials_volume: attenuationColor after
 // attenuationDistance).

@@ -121,18 +121,20 @@ inline Vec2 coneToSquare(const Vec3& w, float oneMinusCosMax) {
   return Vec2(std::min(x / oneMinusCosMax, kOneMinusEpsilon), turnOf(w.x, w.y));
 }
 
-// --- Triangle: barycentric coordinates of the first two vertices, uniform in area (Turk 1990, Graphics Gems) ---
+// --- Triangle: barycentric weights of the second and third vertex, uniform in area (Heitz 2019, "A Low-Distortion Map
+// Between Triangle and Square") ---
 
 inline Vec2 squareToTriangle(const Vec2& u) {
-  const float s = std::sqrt(u.x);
-  return Vec2(1 - s, u.y * s);
+  const bool upper = u.y > u.x;
+  const float half = 0.5f * select(upper, u.x, u.y);
+  return Vec2(select(upper, half, u.x - half), select(upper, u.y - half, half));
 }
 
 inline float trianglePdfA(float area) { return 1 / area; }
 
 inline Vec2 triangleToSquare(const Vec2& b) {
-  const float s = 1 - b.x;
-  return Vec2(sqr(s), s > 0 ? std::min(b.y / s, kOneMinusEpsilon) : 0.0f);
+  const Vec2 u = b.y > b.x ? Vec2(2 * b.x, b.x + b.y) : Vec2(b.x + b.y, 2 * b.y);
+  return glm::min(u, Vec2(kOneMinusEpsilon));
 }
 
 }  // namespace braid

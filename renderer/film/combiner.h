@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// Denoisers and combiners: pure functions from estimates to an image. They see no scene and no rays, so each can be
+// tested on synthetic planes, run during a render, or run on files afterwards.
+//
+// All colours are exposure-normalised before a method sees them (combiners/exposure.h), all inputs are finite, and
+// variances are variances of the mean.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "renderer/film/estimates.h"
+
+namespace braid {
+
+// A number that a user may set, e.g. --js-constant 1.25 on the command line; names are "<method>-<word>".
+struct OptionInfo {
+  std::string name;
+  double fallback = 0;
+  std::string description;
+};
+
+class MethodOptions {
+ public:
+  void set(const std::string& name, double value) { values_[name] = value; }
+  double number(const OptionInfo& option) const {
+    const auto found = values_.find(option.name);
+    return found == values_.end() ? option.fallback : found->second;
+  }
+  const std::map<std::string, double>& values() const { return values_; }
+
+ private:
+  std::map<std::string, double> values_;
+};
+
+// What a method must be given. What is missing keeps it from running, with a sentence that names it.
+struct Needs {
+  bool biased = false;      // a smooth image with halves: a denoiser's, a photon map's or another combiner's
+  bool correlated = false;  // an estimate by common random numbers or gradients
+  int bases = 0;            // images with halves to choose from
+  bool quarters = false;    // of the unbiased (and the correlated) estimate
+  bool features = false;    // works without, but worse
+  int checkpoints = 0;
+  uint64_t passes = 2;  // of the unbiased estimate
+};
+
+// The inputs of one method. Pointers that needs() does not ask for may be null. Widths and heights agree.
+struct MethodInputs {
+  const Estimate* unbiased = nullptr;  // mean, halves, variance
+  const Estimate* biased = nullptr;    // mean, halves; variance and bias where known
+  std::vector<const Estimate*> bases;
+  const Estimate* correlated = nullptr;
+  const Features* features = nullptr;
+  const std::vector<Checkpoint>* history = nullptr;  // of the unbiased estimate, oldest first
+  // Runs the denoiser that made `biased` on another colour image, everything else unchanged.
+  std::function<Rgb<float>(const Rgb<float>&)> redenoise;
+  uint64_t seed = 0;
+  MethodOptions options;
+  const std::atomic<bool>* cancel = nullptr;  // a cancelled method may return anything
+};
+
+struct NamedPlane {
+  std::string name;  // EXR layer or channel, e.g. "weight.pw"
+  Plane<float> plane;
+};
+
+// What a method makes. image.mean is the result; image.half[i] is the same method applied to half i of the inputs
+// (empty when the method has no halves).
+struct MethodResult {
+  Estimate image;
+  Plane<float> error;              // estimated squared error of the mean, channel average; empty: not estimated
+  std::vector<NamedPlane> aovs;    // on request only: weights, shrinkage factors
+  std::vector<Attribute> remarks;  // constants used and counts of fallbacks, for the header
+};
+
+enum class MethodKind { Denoiser, Combiner };
+
+class Method {
+ public:
+  virtual ~Method() = default;
+  virtual const char* name() const = 0;
+  virtual const char* description() const = 0;
+  virtual MethodKind kind() const = 0;
+  virtual Needs needs() const = 0;
+  virtual std::vector<OptionInfo> options() const { return {}; }
+  // Deterministic for any number of threads. A denoiser reads inputs.unbiased and inputs.features.
+  virtual MethodResult run(const MethodInputs& inputs) const = 0;
+};
+
+}  // namespace braid

@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/transport/subpath.h"
+
+#include <algorithm>
+
+namespace braid {
+
+namespace {
+
+constexpr int kMaxNullCrossings = 256;
+constexpr double kMinCosine = 1e-8;
+
+double geometricCosine(const Hit& hit, const Vec3& direction) {
+  return std::max(static_cast<double>(std::abs(glm::dot(direction, hit.ng))), kMinCosine);
+}
+
+// Adjoint BSDF under shading normals: light coming along wo leaves along wi by f |wo·ns| |wi·ng| / (|wo·ng| |wi·ns|)
+// (Veach 1997, eq. 5.19).
+float adjointFactor(const SubpathVertex& v, float wiShading, float wiGeometric) {
+  const float down = std::abs(glm::dot(v.hit.wo, v.hit.ng)) * std::abs(wiShading);
+  const float up = std::abs(v.wo.z) * std::abs(wiGeometric);
+  return down > 0 ? up / down : 0.0f;
+}
+
+}  // namespace
+
+Spectrum mediaTransmittance(const Scene& scene, const MediaStack& media, float distance) {
+  if (media.empty()) return Spectrum(1);
+  const int64_t medium = media.ruling(scene.materials());
+  return medium < 0 ? Spectrum(1) : volumeTransmittance(scene.materials()[static_cast<size_t>(medium)], distance);
+}
+
+VertexValue evaluateVertex(const TransportContext& context, const SubpathVertex& vertex, Transport transport,
+                           const Vec3& wi) {
+  VertexValue value;
+  Vec3 local = vertex.hit.frame.toLocal(wi);
+  const float geometric = glm::dot(wi, vertex.hit.ng);
+  const bool reflects = geometric > 0;
+  if (!reflects && !vertex.twoSided) return value;
+  const bool below = reflects != (local.z > 0);
+  float shading = local.z;
+  if (below) {
+    // TRAP: the light's side must agree with both normals; the camera's side is lifted, as Bsdf does with wo.
+    if (transport == Transport::Radiance) return value;
+    local.z = std::copysign(std::max(std::abs(local.z), 1e-4f), reflects ? 1.0f : -1.0f);
+    local = glm::normalize(local);
+    shading = local.z;
+  }
+  const BsdfValue b = vertex.bsdf.evaluate(local, true);
+  if (isBlack(b.f)) return value;
+  value.f = b.f;
+  value.pdfW = b.pdfW;
+  value.pdfRevW = b.pdfRevW;
+  if (transport == Transport::Power) {
+    value.f *= adjointFactor(vertex, shading, geometric);
+    if (below) value.pdfW = 0;  // no walk from a light leaves below the horizon
+  } else if (vertex.woBelow) {
+    value.pdfRevW = 0;
+  }
+  value.cosGeometric = static_cast<float>(geometricCosine(vertex.hit, wi));
+  value.media = vertex.media;
+  if (!reflects && context.summaryOf(vertex.hit).volume) value.media.cross(vertex.hit.mesh->material, vertex.hit.front);
+  return value;
+}
+
+SubpathBatch::SubpathBatch(const TransportContext& context, const PassSampler& sampler, const WalkSettings& settings)
+    : context_(context),
+      scene_(context.scene),
+      sampler_(sampler),
+      settings_(settings),
+      filtered_(context.scene.accel().filtered()) {}
+
+void SubpathBatch::startCamera(uint64_t key, const Camera::CameraRay& ray, const MediaStack& media, double pdfPixel,
+                               double lightPaths, bool orthographic) {
+  BRAID_ASSERT(count_ < kBatch);
+  SubpathState& s = state_[static_cast<size_t>(count_++)];
+  s = SubpathState();
+  s.key = key;
+  s.origin = ray.origin;
+  s.direction = ray.direction;
+  s.media = media;
+  s.byDistance = !orthographic;
+  if (settings_.mis) s.mis.vcm = sqr(lightPaths / pdfPixel);  // (31)
+}
+
+void SubpathBatch::startLight(uint64_t key, const LightStart& start, const MediaStack& media) {
+  BRAID_ASSERT(count_ < kBatch);
+  SubpathState& s = state_[static_cast<size_t>(count_++)];
+  s = SubpathState();
+  s.key = key;
+  s.origin = start.finite && !start.delta
+                 ? offsetOrigin(start.position, start.positionError, start.normal, start.direction)
+                 : start.position;
+  s.direction = start.direction;
+  s.throughput = start.throughput;
+  s.startThroughput = maxComponent(start.throughput);
+  s.media = media;
+  s.byDistance = start.finite;
+  s.light = start.light;
+  s.pdfEmit = start.pdfEmit;
+  s.cosLight = start.cosLight;
+  s.deltaLight = start.delta;
+}
+
+void SubpathBatch::startNothing() {
+  BRAID_ASSERT(count_ < kBatch);
+  SubpathState& s = state_[static_cast<size_t>(count_++)];
+  s = SubpathState();
+  s.throughput = Spectrum(0);
+}
+
+void SubpathBatch::queueRay(int slot, SubpathState& state) {
+  if (filtered_) {
+    const bool camera = settings_.transport == Transport::Radiance && state.segments == 1;
+    const uint32_t salt = sampler_.salt(state.key, static_cast<uint32_t>(state.segments + state.nullCrossings));
+    state.salt = (salt & ~kCameraRay) | (camera ? kCameraRay : 0);
+  }
+  rays_.set(slot, {state.origin, state.direction, kInfinity, state.salt});
+}
+
+float SubpathBatch::indexOutside(const SubpathState& state, const Hit& hit) const {
+  if (state.media.empty()) return 1;
+  const int64_t medium =
+      state.media.ruling(scene_.materials(), hit.front ? -1 : static_cast<int64_t>(hit.mesh->material));
+  return medium < 0 ? 1.0f : scene_.materials()[static_cast<size_t>(medium)].ior;
+}
+
+SubpathBatch::Arrival SubpathBatch::arrive(SubpathState& state, const RayHit& query, Hit& hit) const {
+  makeHit(scene_, query, state.direction, hit);
+  state.throughput *= mediaTransmittance(scene_, state.media, hit.distance);
+  const MaterialSummary& material = context_.summaryOf(hit);
+  if (settings_.transport == Transport::Power) {
+    const uint32_t light = state.light;
+    const bool positional =
+        light >= context_.lights.firstPositional() && light < context_.lights.firstDirectional() && state.segments == 1;
+    if (positional && glm::length(hit.position - context_.lights.positional(light).position) >
+                          context_.lights.positional(light).range)
+      return Arrival::End;
+    if (material.unlit) return Arrival::End;
+  }
+  if (settings_.mis) {
+    const double cosine = geometricCosine(hit, hit.wo);
+    if (settings_.transport == Transport::Power && state.atStart) {
+      // (31)-(33), here and not at the start because the density of choosing the light depends on where its path
+      // arrives.
+      const bool twoSided = (material.lobes & (kLobeTransmission | kLobeDiffuseTransmission)) != 0;
+      const float direct = context_.lights.pdfDirect(state.light, hit.position, twoSided ? hit.ng : hit.frame.n,
+                                                     twoSided, -state.direction);
+      const double emit = static_cast<double>(state.pdfEmit);
+      state.mis.vcm = sqr(static_cast<double>(direct) / emit);
+      state.mis.vc = state.deltaLight ? 0.0 : sqr(static_cast<double>(state.cosLight) / emit);
+      state.mis.vm = state.mis.vc * settings_.connectWeight;
+    }
+    const double inverse = 1 / sqr(cosine);
+    if (!state.atStart || state.byDistance) state.mis.vcm *= sqr(sqr(static_cast<double>(hit.distance)));
+    state.mis.vcm *= inverse;
+    state.mis.vc *= inverse;
+    state.mis.vm *= inverse;
+  }
+  state.atStart = false;
+  if (material.volume && crossNullInterface(state, hit))
+    return state.nullCrossings < kMaxNullCrossings ? Arrival::Null : Arrival::End;
+  return Arrival::Vertex;
+}
+
+// As in the path tracer: inside of a solid that rules there, another solid's surface scatters nothing.
+bool SubpathBatch::crossNullInterface(SubpathState& state, const Hit& hit) const {
+  const uint32_t material = hit.mesh->material;
+  const int64_t other = state.media.ruling(scene_.materials(), hit.front ? -1 : static_cast<int64_t>(material));
+  if (other < 0 || !MediaStack::outranks(scene_.materials(), other, static_cast<int64_t>(material))) return false;
+  state.media.cross(material, hit.front);
+  state.origin = offsetOrigin(hit, state.direction);
+  state.lightCouldNotBeSampled = true;
+  ++state.nullCrossings;
+  if (settings_.mis) {
+    const double cosine2 = sqr(geometricCosine(hit, state.direction));
+    state.mis = {0, state.mis.vc * cosine2, state.mis.vm * cosine2};
+  }
+  return true;
+}
+
+void SubpathBatch::finishVertex(const SubpathState& state, const Hit& hit, SubpathVertex& vertex) const {
+  vertex.hit = hit;
+  vertex.throughput = state.throughput;
+  vertex.media = state.media;
+  vertex.mis = state.mis;
+  vertex.key = state.key;
+  vertex.segments = state.segments;
+  vertex.twoSided = (context_.summaryOf(hit).lobes & (kLobeTransmission | kLobeDiffuseTransmission)) != 0;
+  vertex.woBelow = !(vertex.wo.z > 0);
+  vertex.deltaOnly = state.deltaOnly;
+}
+
+bool SubpathBatch::scatter(SubpathState& state, const SubpathVertex& vertex) const {
+  const bool power = settings_.transport == Transport::Power;
+  if (power && vertex.woBelow) return false;
+  const SampleBlock block = sampler_.block(state.key, static_cast<unsigned>(state.segments) + (power ? 1u : 0u));
+  BsdfSample sample;
+  const Hit& hit = vertex.hit;
+  if (!vertex.bsdf.sample(block.u[slot::kLobe], {block.u[slot::kBsdfU], block.u[slot::kBsdfV]}, sample)) return false;
+  const Vec3 direction = renormalize(hit.frame.toWorld(sample.wi));
+  const float geometric = glm::dot(direction, hit.ng);
+  if ((geometric > 0) == sample.transmitted) return false;
+  state.throughput *= sample.weight;
+  if (power) state.throughput *= adjointFactor(vertex, sample.wi.z, geometric);
+  if (isBlack(state.throughput)) return false;
+
+  if (sample.transmitted && hit.material->hasVolume()) {
+    const auto index = [&](int64_t m) {
+      return m < 0 ? 1.0f : std::max(scene_.materials()[static_cast<size_t>(m)].ior, 1e-3f);
+    };
+    const int64_t before = state.media.ruling(scene_.materials());
+    state.media.cross(hit.mesh->material, hit.front);
+    const int64_t after = state.media.ruling(scene_.materials());
+    if (!power) state.etaScale *= sqr(index(before) / index(after));
+  }
+  if (settings_.mis) {
+    const double cosine = geometricCosine(hit, direction);
+    MisQuantities& m = state.mis;
+    if (sample.delta) {  // (53)-(55)
+      m = {0, m.vc * sqr(cosine), m.vm * sqr(cosine)};
+    } else {  // (34)-(36)
+      const double forward = static_cast<double>(sample.pdfW);
+      double reverse = static_cast<double>(vertex.bsdf.evaluate(sample.wi, true).pdfRevW);
+      if (!power && vertex.woBelow) reverse = 0;
+      const double ratio = sqr(cosine / forward);
+      m.vc = ratio * (m.vc * sqr(reverse) + m.vcm + settings_.mergeWeight);
+      m.vm = ratio * (m.vm * sqr(reverse) + m.vcm * settings_.connectWeight + 1);
+      m.vcm = sqr(1 / forward);
+    }
+  }
+  state.origin = offsetOrigin(hit, direction);
+  state.direction = direction;
+  state.lastPosition = hit.position;
+  state.lastNormal = vertex.receiverNormal();
+  state.lastTwoSided = vertex.twoSided;
+  state.lightCouldNotBeSampled = sample.delta;
+  state.deltaOnly = state.deltaOnly && sample.delta;
+
+  if (state.segments >= settings_.rouletteStart) {
+    const float relative = maxComponent(state.throughput) / (state.startThroughput * state.etaScale);
+    if (relative < 1) {
+      if (!(block.u[slot::kRoulette] < relative)) return false;
+      state.throughput /= relative;
+    }
+  }
+  ++state.segments;
+  return true;
+}
+
+}  // namespace braid

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+// Random walks from the camera and from the lights, for integrators that store, connect or merge their vertices. They
+// carry recursive quantities from which the weight of every way to sample a full path follows in constant time
+// (Georgiev 2012, "Implementing Vertex Connection and Merging", technical report: equation numbers below), with squared
+// densities, which is Veach's power heuristic with exponent 2.
+//
+// Conventions that make all ways agree:
+//   - densities per area use the geometric normals, BSDF cosines the shading normals;
+//   - delta scattering and null interfaces (media.h) are vertices that no one can connect to;
+//   - the light side must see a surface from the same side by both normals, as for light samples of a path tracer; a
+//     camera side below the shading horizon is lifted to it, and no walk from a light can leave that way.
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include "renderer/core/error.h"
+#include "renderer/core/sampler.h"
+#include "renderer/scene/camera.h"
+#include "renderer/transport/bsdf.h"
+#include "renderer/transport/context.h"
+#include "renderer/transport/light_emission.h"
+
+namespace braid {
+
+// dVCM, dVC and dVM of the report (31)-(39); doubles, because squared ratios leave the range of floats.
+struct MisQuantities {
+  double vcm = 0, vc = 0, vm = 0;
+};
+
+struct WalkSettings {
+  Transport transport = Transport::Radiance;
+  int maxSegments = 32;
+  int rouletteStart = 4;     // segments before Russian roulette begins
+  double connectWeight = 0;  // (1 / etaVCM)² when vertices are merged as well, else 0
+  double mergeWeight = 0;    // etaVCM² with etaVCM = π r² · light subpaths, else 0
+  bool mis = true;           // false: the quantities are not needed and stay 0
+};
+
+// A surface point that a walk has arrived at.
+struct SubpathVertex {
+  Hit hit;
+  Bsdf bsdf;
+  Vec3 wo;                 // hit.wo in the shading frame
+  Spectrum throughput{0};  // of the walk up to here, before this BSDF
+  MediaStack media;        // on the side of wo
+  MisQuantities mis;       // complete for this vertex
+  uint64_t key = 0;
+  int segments = 0;        // of the walk up to here
+  bool twoSided = false;   // transmits
+  bool woBelow = false;    // wo lies below the horizon of the shading normal
+  bool deltaOnly = false;  // everything since the start of the walk was delta
+
+  SubpathVertex(const SurfaceParameters& p, const Vec3& o, Transport t) : bsdf(p, o, t), wo(o) {}
+  SubpathVertex(const Spectrum& albedo, const Vec3& o) : bsdf(albedo, o), wo(o) {}
+  // The normal by which lights are chosen here.
+  const Vec3& receiverNormal() const { return twoSided ? hit.ng : hit.frame.n; }
+};
+
+// The BSDF of a vertex toward a direction, for connections.
+struct VertexValue {
+  Spectrum f{0};  // BSDF · |cos shading|; for light subpaths with the adjoint correction, BSDF · |cos geometric|·…
+  float pdfW = 0;          // density with which the walk would go on that way
+  float pdfRevW = 0;       // density with which a walk the other way would go back along wo
+  float cosGeometric = 0;  // |cos| with the geometric normal
+  MediaStack media;        // the solids that the direction leads into
+};
+
+struct SubpathState {
+  Vec3 origin, direction;
+  Spectrum throughput{1};
+  MediaStack media;
+  MisQuantities mis;
+  uint64_t key = 0;
+  int segments = 1;  // including the ray that is under way
+  int nullCrossings = 0;
+  uint32_t salt = 0;
+  float startThroughput = 1;
+  float etaScale = 1;
+  bool byDistance = true;  // densities of the first hit depend on its distance: not for parallel rays
+  bool deltaOnly = true;
+  bool atStart = true;  // no surface met yet
+
+  // The last vertex that scattered, for the weight of lights that the walk hits.
+  Vec3 lastPosition{0}, lastNormal{0};
+  bool lastTwoSided = false;
+  bool lightCouldNotBeSampled = true;  // camera, delta scattering, or a null interface since
+
+  uint32_t light = 0;  // where a light subpath started
+  float pdfEmit = 0, cosLight = 1;
+  bool deltaLight = false;
+};
+
+// Value of a vertex's BSDF toward the unit world direction `wi`; f is zero where nothing can be.
+VertexValue evaluateVertex(const TransportContext& context, const SubpathVertex& vertex, Transport transport,
+                           const Vec3& wi);
+
+// Transmittance of the ruling medium of a stack over a distance in metres.
+Spectrum mediaTransmittance(const Scene& scene, const MediaStack& media, float distance);
+
+// Walks up to kBatch subpaths in step, as the path tracer's kernel does.
+class SubpathBatch {
+ public:
+  SubpathBatch(const TransportContext& context, const PassSampler& sampler, const WalkSettings& settings);
+
+  // Begin a walk; the index of the walk is the order of these calls since clear(). Dimension blocks: camera walks use
+  // block k at their k-th vertex, light walks block k + 1 (block 1 belongs to the start).
+  // `pdfPixel` is the density of the ray per steradian (perspective) or m² (orthographic), of one pixel; lightPaths the
+  // number of light subpaths of the pass.
+  void startCamera(uint64_t key, const Camera::CameraRay& ray, const MediaStack& media, double pdfPixel,
+                   double lightPaths, bool orthographic);
+  void startLight(uint64_t key, const LightStart& start, const MediaStack& media);
+  // A walk that begins with zero throughput and ends at once, to keep indices in step.
+  void startNothing();
+  void clear() { count_ = 0; }
+
+  // Follows all walks to their ends. onHit(index, state, vertex) → whether to go on; it sees every surface but null
+  // interfaces. onMiss(index, state) when a walk leaves the scene; state.mis is that of the departing ray.
+  template <class OnHit, class OnMiss>
+  void run(const OnHit& onHit, const OnMiss& onMiss);
+
+  const PassSampler& sampler() const { return sampler_; }
+  uint64_t rayCount = 0;
+
+ private:
+  enum class Arrival { End, Null, Vertex };
+  void queueRay(int slot, SubpathState& state);
+  // Brings the walk to a hit: attenuation and the quantities' conversion to area.
+  Arrival arrive(SubpathState& state, const RayHit& query, Hit& hit) const;
+  void finishVertex(const SubpathState& state, const Hit& hit, SubpathVertex& vertex) const;
+  bool scatter(SubpathState& state, const SubpathVertex& vertex) const;
+  bool crossNullInterface(SubpathState& state, const Hit& hit) const;
+  float indexOutside(const SubpathState& state, const Hit& hit) const;
+
+  const TransportContext& context_;
+  const Scene& scene_;
+  const PassSampler& sampler_;
+  WalkSettings settings_;
+  bool filtered_;
+  int count_ = 0;
+  std::array<SubpathState, kBatch> state_;
+  std::array<int, kBatch> active_;
+  RayBatch rays_;
+  std::array<RayHit, kBatch> hits_;
+};
+
+template <class OnHit, class OnMiss>
+void SubpathBatch::run(const OnHit& onHit, const OnMiss& onMiss) {
+  int active = 0;
+  for (int i = 0; i < count_; ++i) {
+    if (isBlack(state_[static_cast<size_t>(i)].throughput)) continue;
+    active_[static_cast<size_t>(active)] = i;
+    queueRay(active++, state_[static_cast<size_t>(i)]);
+  }
+  while (active > 0) {
+    scene_.accel().intersect(rays_, active, hits_.data());
+    rayCount += static_cast<uint64_t>(active);
+    int alive = 0;
+    for (int a = 0; a < active; ++a) {
+      const int index = active_[static_cast<size_t>(a)];
+      SubpathState& state = state_[static_cast<size_t>(index)];
+      const RayHit& query = hits_[static_cast<size_t>(a)];
+      if (!(query.t < kInfinity)) {
+        onMiss(index, state);
+        continue;
+      }
+      Hit hit;
+      const Arrival arrival = arrive(state, query, hit);
+      if (arrival == Arrival::End) continue;
+      if (arrival == Arrival::Vertex) {
+        const uint32_t lobes = context_.summaryOf(hit).lobes;
+        const Vec3 wo = hit.frame.toLocal(hit.wo);
+        SubpathVertex vertex =
+            lobes == kLobeDiffuse
+                ? SubpathVertex(baseColorAt(scene_, hit), wo)
+                : SubpathVertex(surfaceAt(scene_, hit, lobes, indexOutside(state, hit)), wo, settings_.transport);
+        finishVertex(state, hit, vertex);
+        if (!onHit(index, state, vertex)) continue;
+        if (state.segments >= settings_.maxSegments || !scatter(state, vertex)) continue;
+      }
+      active_[static_cast<size_t>(alive)] = index;
+      queueRay(alive++, state);
+    }
+    active = alive;
+  }
+}
+
+}  // namespace braid
