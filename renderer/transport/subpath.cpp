@@ -128,6 +128,7 @@ float SubpathBatch::indexOutside(const SubpathState& state, const Hit& hit) cons
 SubpathBatch::Arrival SubpathBatch::arrive(SubpathState& state, const RayHit& query, Hit& hit) const {
   makeHit(scene_, query, state.direction, hit);
   state.throughput *= mediaTransmittance(scene_, state.media, hit.distance);
+  state.travelled += hit.distance;
   const MaterialSummary& material = context_.summaryOf(hit);
   if (settings_.transport == Transport::Power) {
     const uint32_t light = state.light;
@@ -186,6 +187,7 @@ void SubpathBatch::finishVertex(const SubpathState& state, const Hit& hit, Subpa
   vertex.mis = state.mis;
   vertex.key = state.key;
   vertex.segments = state.segments;
+  vertex.travelled = state.travelled;
   vertex.twoSided = (context_.summaryOf(hit).lobes & (kLobeTransmission | kLobeDiffuseTransmission)) != 0;
   vertex.woBelow = !(vertex.wo.z > 0);
   vertex.deltaOnly = state.deltaOnly;

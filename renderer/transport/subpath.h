@@ -48,6 +48,7 @@ struct SubpathVertex {
   uint64_t key = 0;
   int segments = 0;        // of the walk up to here
   bool twoSided = false;   // transmits
+  float travelled = 0;     // metres since the start of the walk
   bool woBelow = false;    // wo lies below the horizon of the shading normal
   bool deltaOnly = false;  // everything since the start of the walk was delta
 
@@ -74,6 +75,7 @@ struct SubpathState {
   uint64_t key = 0;
   int segments = 1;  // including the ray that is under way
   int nullCrossings = 0;
+  float travelled = 0;    // metres since the start
   uint32_t salt = 0;
   float startThroughput = 1;
   float etaScale = 1;

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// What integrators with light subpaths prepare once per render.
+#pragma once
+
+#include "renderer/session/integrator.h"
+#include "renderer/transport/light_emission.h"
+
+namespace braid {
+
+struct LightPreparation : Preparation {
+  explicit LightPreparation(const TransportContext& context);
+  LightEmission emission;
+  int splatFractionBits = 32;  // PassTarget::setSplatFractionBits()
+
+  // The preparation of a request, or one of its own when it has none.
+  class Ref {
+   public:
+    explicit Ref(const PassRequest& request);
+    const LightPreparation* operator->() const { return used_; }
+
+   private:
+    std::unique_ptr<const LightPreparation> own_;
+    const LightPreparation* used_;
+  };
+};
+
+// Whether light subpaths can find light that eye subpaths miss.
+Applies lightPathsApply(const SceneTraits& traits);
+
+// The solids that the camera is inside of.
+MediaStack mediaOfCamera(const Scene& scene, const Camera& camera);
+
+}  // namespace braid
