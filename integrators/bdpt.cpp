@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bidirectional path tracing; the strategies are in bidirectional.h.
-#include <cmath>
-
 #include "integrators/bidirectional.h"
 #include "integrators/light_preparation.h"
 #include "integrators/registry.h"
+#include "integrators/strategies.h"
 #include "integrators/tiles.h"
 
 namespace braid {
@@ -12,6 +11,22 @@ namespace braid {
 namespace {
 
 constexpr uint64_t kEyeStream = 0x62640, kLightStream = 0x62641;
+
+// What the batches of a pass share.
+struct Pass {
+  LightPreparation::Ref preparation;
+  PassSampler eyeSampler, lightSampler;
+  LightPaths lights;
+  MediaStack cameraMedia;
+
+  explicit Pass(const PassRequest& r)
+      : preparation(r),
+        eyeSampler(r.plan.settings.sampler, r.plan.settings.seed, kEyeStream, r.pass),
+        lightSampler(r.plan.settings.sampler, r.plan.settings.seed, kLightStream, r.pass),
+        lights{preparation->emission, lightSampler,
+               static_cast<double>(r.plan.window.width()) * static_cast<double>(r.plan.window.height())},
+        cameraMedia(mediaOfCamera(r.context.scene, r.plan.camera)) {}
+};
 
 class BidirectionalPathTracer final : public Integrator {
  public:
@@ -26,34 +41,36 @@ class BidirectionalPathTracer final : public Integrator {
   }
 
   bool renderPass(const PassRequest& request, PassTarget& target) const override {
-    const Plan& plan = request.plan;
-    const LightPreparation::Ref preparation(request);
-    target.setSplatFractionBits(preparation->splatFractionBits);
-    const PassSampler eyeSampler(plan.settings.sampler, plan.settings.seed, kEyeStream, request.pass);
-    const PassSampler lightSampler(plan.settings.sampler, plan.settings.seed, kLightStream, request.pass);
-    const LightPaths lights{preparation->emission, lightSampler,
-                            static_cast<double>(plan.window.width()) * plan.window.height()};
-    const MediaStack cameraMedia = mediaOfCamera(request.context.scene, plan.camera);
-    return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>*) {
-      BidirectionalKernel kernel(request, lights, eyeSampler, cameraMedia, target);
-      std::vector<std::pair<int, int>> pixels;
-      const auto flush = [&] {
-        kernel.render(pixels);
-        pixels.clear();
-      };
-      for (int y = tile.y0; y < tile.y1; ++y)
-        for (int x = tile.x0; x < tile.x1; ++x) {
-          pixels.emplace_back(x, y);
-          if (pixels.size() == kBatch) flush();
-        }
-      if (!pixels.empty()) flush();
-      return TileCounts{static_cast<uint64_t>(tile.width()) * static_cast<uint64_t>(tile.height()), kernel.rayCount(),
-                        kernel.shadowRayCount()};
-    });
+    return renderBidirectionalPass(request, target, nullptr);
   }
 };
 
 }  // namespace
+
+bool renderBidirectionalPass(const PassRequest& request, PassTarget& target, StrategyObserver* observer) {
+  const Pass pass(request);
+  target.setSplatFractionBits(pass.preparation->splatFractionBits);
+  return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>*) {
+    BidirectionalKernel kernel(request, pass.lights, pass.eyeSampler, pass.cameraMedia, target, observer);
+    std::vector<std::pair<int, int>> pixels;
+    for (int y = tile.y0; y < tile.y1; ++y)
+      for (int x = tile.x0; x < tile.x1; ++x) {
+        pixels.emplace_back(x, y);
+        if (pixels.size() < kBatch && !(x == tile.x1 - 1 && y == tile.y1 - 1)) continue;
+        kernel.render(pixels);
+        pixels.clear();
+      }
+    return TileCounts{static_cast<uint64_t>(tile.width()) * static_cast<uint64_t>(tile.height()), kernel.rayCount(),
+                      kernel.shadowRayCount()};
+  });
+}
+
+void replayBidirectionalPixel(const PassRequest& request, int x, int y, StrategyObserver& observer) {
+  const Pass pass(request);
+  const PixelWindow& w = request.plan.window;
+  PassTarget target(w.width(), w.height(), true, request.plan.features, request.plan.settings.transparent);
+  BidirectionalKernel(request, pass.lights, pass.eyeSampler, pass.cameraMedia, target, &observer).render({{x, y}});
+}
 
 std::unique_ptr<Integrator> make_bdpt() { return std::make_unique<BidirectionalPathTracer>(); }
 

@@ -168,8 +168,8 @@ void BidirectionalKernel::connectToCamera(const SubpathVertex& vertex) {
   const double wLight =  // (46)
       sqr(cameraPdfA / lights_.count) * (vertex.mis.vcm + vertex.mis.vc * square(v.pdfRevW));
   const double factor = pixelPdf / (spread * lights_.count * (1 + wLight));
-  const Spectrum value = vertex.throughput * v.f * static_cast<float>(factor) *
-                         mediaTransmittance(scene_, v.media, distance);
+  const Spectrum value =
+      vertex.throughput * v.f * static_cast<float>(factor) * mediaTransmittance(scene_, v.media, distance);
   if (isBlack(value)) return;
   // From the camera, so that culled back faces let it pass as they do camera rays.
   const Vec3 end = offsetOrigin(vertex.hit, wi);
@@ -314,8 +314,8 @@ void BidirectionalKernel::connect(int index, const SubpathVertex& eye) {
     const double inverse2 = 1 / static_cast<double>(distance2);
     const double eyePdfA = static_cast<double>(e.pdfW * l.cosGeometric) * inverse2;
     const double lightPdfA = static_cast<double>(l.pdfW * e.cosGeometric) * inverse2;
-    const double wLight = sqr(eyePdfA) * (light.mis.vcm + light.mis.vc * square(l.pdfRevW));   // (40)
-    const double wCamera = sqr(lightPdfA) * (eye.mis.vcm + eye.mis.vc * square(e.pdfRevW));    // (41)
+    const double wLight = sqr(eyePdfA) * (light.mis.vcm + light.mis.vc * square(l.pdfRevW));  // (40)
+    const double wCamera = sqr(lightPdfA) * (eye.mis.vcm + eye.mis.vc * square(e.pdfRevW));   // (41)
     const Spectrum value = eye.throughput * e.f * (light.throughput * l.f) *
                            static_cast<float>(inverse2 / (1 + wLight + wCamera)) *
                            mediaTransmittance(scene_, e.media, distance);
@@ -335,8 +335,8 @@ void BidirectionalKernel::connect(int index, const SubpathVertex& eye) {
     }
     const Vec3 origin = offsetOrigin(eye.hit, c.direction);
     const Vec3 end = offsetOrigin(light.hit, -c.direction);
-    const uint32_t salt =
-        eyeSampler_.salt(eye.key, 0x20000u + static_cast<uint32_t>(eye.segments) * 64u + static_cast<uint32_t>(c.vertex));
+    const uint32_t salt = eyeSampler_.salt(
+        eye.key, 0x20000u + static_cast<uint32_t>(eye.segments) * 64u + static_cast<uint32_t>(c.vertex));
     queue_.add({origin, end - origin, kShadowLength, salt & ~kCameraRay},
                {value, light.segments + 1, eye.segments + 1, index});
   }

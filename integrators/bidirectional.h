@@ -6,7 +6,8 @@
 //   s > 1, t > 1    a connection of two stored vertices,
 //   t = 1           a light vertex is connected to the camera and splatted.
 // t = 0 cannot happen with a pinhole or an orthographic camera, and lights are seen directly by s = 0 alone. Weights:
-// power heuristic through the recursive quantities of renderer/transport/subpath.h, whose report's numbers appear below.
+// power heuristic through the recursive quantities of renderer/transport/subpath.h, whose report's numbers appear
+// below.
 #pragma once
 
 #include <array>
@@ -42,7 +43,7 @@ class ConnectionQueue {
   struct Entry {
     Spectrum value;
     int s, t;
-    int sample;          // index of the eye subpath, or -1: a splat at (x, y)
+    int sample;  // index of the eye subpath, or -1: a splat at (x, y)
     int x = 0, y = 0;
     bool forFeatures = false;
   };

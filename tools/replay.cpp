@@ -5,7 +5,9 @@
 
 #include "integrators/path_kernel.h"
 #include "integrators/registry.h"
+#include "integrators/strategies.h"
 #include "renderer/core/error.h"
+#include "renderer/film/exr.h"
 #include "tools/cli.h"
 
 namespace braid {
@@ -16,7 +18,7 @@ struct ReplayOptions {
   SceneChoice scene;
   SampleChoice samples;
   uint64_t pass = 0;
-  std::string pixel;
+  std::string pixel, strategies;
 };
 
 std::string show(const Vec3& v) { return fmt::format("({:.6g} {:.6g} {:.6g})", v.x, v.y, v.z); }
@@ -43,12 +45,54 @@ class PrintingObserver final : public PathObserver {
   const Scene& scene_;
 };
 
+class PrintingStrategies final : public StrategyObserver {
+ public:
+  void onVertex(const SubpathVertex& v, Transport transport) override {
+    fmt::print("{} vertex {}: mesh {} '{}', triangle {}, material '{}' at {}, throughput {}\n",
+               transport == Transport::Power ? "light" : "eye", v.segments, v.hit.meshIndex, v.hit.mesh->name,
+               v.hit.triangle, v.hit.material->name, show(v.hit.position), show(v.throughput));
+  }
+  void onContribution(int s, int t, int x, int y, const Spectrum& value) override {
+    fmt::print("   s={} t={} adds {} to pixel {},{}\n", s, t, show(value), x, y);
+  }
+};
+
+// One EXR with the image of every strategy as a layer "s<s>t<t>" and their sum as the headline.
+void writeStrategies(const TransportContext& context, const Plan& plan, const std::string& path) {
+  const uint64_t passes = std::max<uint64_t>(plan.settings.spp, 1);
+  const std::vector<StrategyImage> images = renderStrategies(context, plan, passes);
+  Rgb<float> sum(plan.window.width(), plan.window.height());
+  ExrOptions options;
+  for (const StrategyImage& image : images) {
+    options.layers.push_back({fmt::format("s{}t{}", image.s, image.t), &image.mean});
+    double total = 0;
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t i = 0; i < sum.size(); ++i) {
+        sum[c][i] += image.mean[c][i];
+        total += static_cast<double>(image.mean[c][i]);
+      }
+    fmt::print("s={} t={}: mean {:.6g}\n", image.s, image.t, total / static_cast<double>(3 * sum.size()));
+  }
+  Estimates estimates;
+  estimates.width = sum.width();
+  estimates.height = sum.height();
+  estimates.window = plan.window;
+  estimates.fullWidth = plan.settings.width;
+  estimates.fullHeight = plan.settings.height;
+  writeExr(path, estimates, sum, nullptr, options);
+  fmt::print("Saved: {}\n", path);
+}
+
 int runReplay(const ReplayOptions& o) {
   const Settings settings = makeSettings(o.scene, o.samples);
+  const bool bidirectional = settings.integrators.front() == "bdpt";
   int x = 0, y = 0;
   char rest = 0;
-  if (std::sscanf(o.pixel.c_str(), "%d,%d%c", &x, &y, &rest) != 2 || x < 0 || y < 0 || x >= settings.width ||
-      y >= settings.height)
+  if (o.strategies.empty() == o.pixel.empty() || (!o.strategies.empty() && !bidirectional))
+    throw Error(ExitCode::Usage, "give --pixel X,Y, or --integrator bdpt --strategies FILE");
+  const bool valid = std::sscanf(o.pixel.c_str(), "%d,%d%c", &x, &y, &rest) == 2 && x >= 0 && y >= 0 &&
+                     x < settings.width && y < settings.height;
+  if (!o.pixel.empty() && !valid)
     throw Error(ExitCode::Usage, fmt::format("--pixel '{}': expected X,Y inside the {}x{} frame", o.pixel,
                                              settings.width, settings.height));
   SceneData data = loadScene(o.scene);
@@ -58,12 +102,22 @@ int runReplay(const ReplayOptions& o) {
   const Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
   const TransportContext context(*scene, settings.lightStrategy);
   const Integrator& integrator = *plan.integrators.front().integrator;
+  if (!o.strategies.empty()) {
+    writeStrategies(context, plan, o.strategies);
+    return 0;
+  }
+  if (bidirectional) {
+    fmt::print("bdpt pass {} pixel {},{} of {}x{}\n", o.pass, x, y, settings.width, settings.height);
+    PrintingStrategies printer;
+    replayBidirectionalPixel({context, plan, o.pass}, x, y, printer);
+    return 0;
+  }
   const auto sampler = integrator.pixelSampler(plan, o.pass);
   if (!sampler)
     throw Error(ExitCode::Usage, fmt::format("integrator '{}' has no camera paths to replay", integrator.name()));
 
   PrintingObserver observer(*scene);
-  PathKernel kernel(context, plan, *sampler, nullptr);
+  PathKernel kernel(context, plan, *sampler, nullptr, integrator.rouletteStart());
   kernel.observe(&observer);
   fmt::print("{} pass {} pixel {},{} of {}x{}\n", integrator.name(), o.pass, x, y, settings.width, settings.height);
   kernel.start(x, y, integrator.pixelKey(*sampler, plan, x, y));
@@ -77,11 +131,16 @@ int runReplay(const ReplayOptions& o) {
 void addReplay(CLI::App& app, Action& action) {
   auto options = std::make_shared<ReplayOptions>();
   CLI::App* command = app.add_subcommand("replay", "Follow one path of a render, vertex by vertex");
-  command->footer("Example:\n  braid replay scene.glb --pass 17 --pixel 200,131");
+  command->footer(
+      "Examples:\n  braid replay scene.glb --pass 17 --pixel 200,131\n  braid replay scene.glb --integrator bdpt --spp "
+      "64 "
+      "--strategies ways.exr");
   addSceneOptions(*command, options->scene);
   addSampleOptions(*command, options->samples);
   command->add_option("--pass", options->pass, "Index of the pass")->capture_default_str();
-  command->add_option("--pixel", options->pixel, "X,Y in the full frame")->required();
+  command->add_option("--pixel", options->pixel, "X,Y in the full frame");
+  command->add_option("--strategies", options->strategies,
+                      "EXR with the image of every way (s, t) of bdpt to find light, over --spp passes");
   command->callback([options, &action] { action = [options] { return runReplay(*options); }; });
 }
 
