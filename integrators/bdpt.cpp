@@ -52,14 +52,7 @@ bool renderBidirectionalPass(const PassRequest& request, PassTarget& target, Str
   target.setSplatFractionBits(pass.preparation->splatFractionBits);
   return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>*) {
     BidirectionalKernel kernel(request, pass.lights, pass.eyeSampler, pass.cameraMedia, target, observer);
-    std::vector<std::pair<int, int>> pixels;
-    for (int y = tile.y0; y < tile.y1; ++y)
-      for (int x = tile.x0; x < tile.x1; ++x) {
-        pixels.emplace_back(x, y);
-        if (pixels.size() < kBatch && !(x == tile.x1 - 1 && y == tile.y1 - 1)) continue;
-        kernel.render(pixels);
-        pixels.clear();
-      }
+    renderTile(kernel, tile);
     return TileCounts{static_cast<uint64_t>(tile.width()) * static_cast<uint64_t>(tile.height()), kernel.rayCount(),
                       kernel.shadowRayCount()};
   });

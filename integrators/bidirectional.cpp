@@ -19,15 +19,6 @@ constexpr float kVisibilityThreshold = 0.1f;
 
 double square(float x) { return sqr(static_cast<double>(x)); }
 
-WalkSettings walkSettings(const Plan& plan, Transport transport) {
-  WalkSettings s;
-  s.transport = transport;
-  // The last segment of a light subpath's path is the connection.
-  s.maxSegments = transport == Transport::Power ? plan.settings.maxDepth - 1 : plan.settings.maxDepth;
-  s.rouletteStart = kRouletteStart;
-  return s;
-}
-
 float hashToUnit(uint64_t key, uint32_t a, uint32_t b) {
   const uint32_t h = mix32(mix32(static_cast<uint32_t>(key >> 32) ^ (a * 0x9e3779b9u)) ^
                            mix32(static_cast<uint32_t>(key) + b * 0x85ebca6bu));
@@ -35,6 +26,30 @@ float hashToUnit(uint64_t key, uint32_t a, uint32_t b) {
 }
 
 }  // namespace
+
+WalkSettings bidirectionalWalk(const Plan& plan, Transport transport, const Merging* merging) {
+  WalkSettings s;
+  s.transport = transport;
+  // The last segment of a light subpath's path is the connection.
+  s.maxSegments = transport == Transport::Power ? plan.settings.maxDepth - 1 : plan.settings.maxDepth;
+  s.rouletteStart = kRouletteStart;
+  if (merging) {
+    s.connectWeight = merging->connectWeight;
+    s.mergeWeight = merging->mergeWeight;
+  }
+  return s;
+}
+
+void renderTile(BidirectionalKernel& kernel, const PixelWindow& tile) {
+  std::vector<std::pair<int, int>> pixels;
+  for (int y = tile.y0; y < tile.y1; ++y)
+    for (int x = tile.x0; x < tile.x1; ++x) {
+      pixels.emplace_back(x, y);
+      if (pixels.size() < kBatch && !(x == tile.x1 - 1 && y == tile.y1 - 1)) continue;
+      kernel.render(pixels);
+      pixels.clear();
+    }
+}
 
 void LightPaths::start(SubpathBatch& batch, uint64_t item) const {
   const uint64_t key = sampler.itemKey(item);
@@ -59,7 +74,7 @@ void ConnectionQueue::flush() {
 
 BidirectionalKernel::BidirectionalKernel(const PassRequest& request, const LightPaths& lights,
                                          const PassSampler& eyeSampler, const MediaStack& cameraMedia,
-                                         PassTarget& target, StrategyObserver* observer)
+                                         PassTarget& target, StrategyObserver* observer, const Merging* merging)
     : request_(request),
       context_(request.context),
       scene_(request.context.scene),
@@ -69,16 +84,15 @@ BidirectionalKernel::BidirectionalKernel(const PassRequest& request, const Light
       cameraMedia_(cameraMedia),
       target_(target),
       observer_(observer),
-      light_(request.context, lights.sampler, walkSettings(request.plan, Transport::Power)),
-      eye_(request.context, eyeSampler, walkSettings(request.plan, Transport::Radiance)),
+      merging_(merging),
+      mergeWeight_(merging ? merging->mergeWeight : 0.0),
+      light_(request.context, lights.sampler, bidirectionalWalk(request.plan, Transport::Power, merging)),
+      eye_(request.context, eyeSampler, bidirectionalWalk(request.plan, Transport::Radiance, merging)),
       queue_(request.context.scene, [this](const ConnectionQueue::Entry& e) { deliver(e); }) {}
 
 void BidirectionalKernel::render(const std::vector<std::pair<int, int>>& pixels) {
   pixels_ = &pixels;
-  const auto item = [&](const std::pair<int, int>& p) {
-    return static_cast<uint64_t>(p.second) * static_cast<uint64_t>(plan_.settings.width) +
-           static_cast<uint64_t>(p.first);
-  };
+  const auto item = [&](const std::pair<int, int>& p) { return pixelItem(plan_, p.first, p.second); };
   light_.clear();
   eye_.clear();
   for (size_t i = 0; i < pixels.size(); ++i) {
@@ -166,7 +180,7 @@ void BidirectionalKernel::connectToCamera(const SubpathVertex& vertex) {
   const double pixelPdf = camera.pixelPdf(-wi);
   const double cameraPdfA = pixelPdf * static_cast<double>(v.cosGeometric) / spread;
   const double wLight =  // (46)
-      sqr(cameraPdfA / lights_.count) * (vertex.mis.vcm + vertex.mis.vc * square(v.pdfRevW));
+      sqr(cameraPdfA / lights_.count) * (mergeWeight_ + vertex.mis.vcm + vertex.mis.vc * square(v.pdfRevW));
   const double factor = pixelPdf / (spread * lights_.count * (1 + wLight));
   const Spectrum value =
       vertex.throughput * v.f * static_cast<float>(factor) * mediaTransmittance(scene_, v.media, distance);
@@ -191,6 +205,7 @@ bool BidirectionalKernel::shadeEyeVertex(int index, const SubpathState& state, c
   if (!vertex.bsdf.hasNonDelta()) return true;
   sampleLight(index, vertex, first);
   connect(index, vertex);
+  if (merging_) merge(index, vertex);
   return true;
 }
 
@@ -280,7 +295,7 @@ void BidirectionalKernel::sampleLight(int index, const SubpathVertex& vertex, bo
   const double wCamera =  // (45)
       sqr(static_cast<double>(emit) * static_cast<double>(v.cosGeometric) /
           (static_cast<double>(directPdf) * static_cast<double>(cosLight))) *
-      (vertex.mis.vcm + vertex.mis.vc * square(v.pdfRevW));
+      (mergeWeight_ + vertex.mis.vcm + vertex.mis.vc * square(v.pdfRevW));
   const auto weight = static_cast<float>(1 / (1 + wLight + wCamera));
   const Spectrum value = vertex.throughput * v.f * light.radiance * (weight / light.pdfW) *
                          mediaTransmittance(scene_, v.media, light.distance);
@@ -314,8 +329,8 @@ void BidirectionalKernel::connect(int index, const SubpathVertex& eye) {
     const double inverse2 = 1 / static_cast<double>(distance2);
     const double eyePdfA = static_cast<double>(e.pdfW * l.cosGeometric) * inverse2;
     const double lightPdfA = static_cast<double>(l.pdfW * e.cosGeometric) * inverse2;
-    const double wLight = sqr(eyePdfA) * (light.mis.vcm + light.mis.vc * square(l.pdfRevW));  // (40)
-    const double wCamera = sqr(lightPdfA) * (eye.mis.vcm + eye.mis.vc * square(e.pdfRevW));   // (41)
+    const double wLight = sqr(eyePdfA) * (mergeWeight_ + light.mis.vcm + light.mis.vc * square(l.pdfRevW));  // (40)
+    const double wCamera = sqr(lightPdfA) * (mergeWeight_ + eye.mis.vcm + eye.mis.vc * square(e.pdfRevW));   // (41)
     const Spectrum value = eye.throughput * e.f * (light.throughput * l.f) *
                            static_cast<float>(inverse2 / (1 + wLight + wCamera)) *
                            mediaTransmittance(scene_, e.media, distance);
@@ -340,6 +355,21 @@ void BidirectionalKernel::connect(int index, const SubpathVertex& eye) {
     queue_.add({origin, end - origin, kShadowLength, salt & ~kCameraRay},
                {value, light.segments + 1, eye.segments + 1, index});
   }
+}
+
+void BidirectionalKernel::merge(int index, const SubpathVertex& eye) {
+  Spectrum sum(0);
+  merging_->grid->query(eye.hit.position, [&](const MergeVertex& light) {
+    if (eye.segments + light.segments > plan_.settings.maxDepth) return;
+    const VertexValue e = evaluateVertex(context_, eye, Transport::Radiance, light.wo);
+    if (isBlack(e.f) || !(light.cosGeometric > 0)) return;
+    const double wLight =  // (38)
+        light.mis.vcm * merging_->connectWeight + light.mis.vm * square(e.pdfW);
+    const double wCamera = eye.mis.vcm * merging_->connectWeight + eye.mis.vm * square(e.pdfRevW);  // (39)
+    // Flux per area becomes radiance by the cosine at the surface that it crossed.
+    sum += e.f * light.throughput * static_cast<float>(1 / (1 + wLight + wCamera)) / light.cosGeometric;
+  });
+  if (!isBlack(sum)) add(index, -1, eye.segments + 1, eye.throughput * sum * merging_->normalization);
 }
 
 }  // namespace braid

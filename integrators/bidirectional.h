@@ -14,6 +14,7 @@
 #include <functional>
 #include <vector>
 
+#include "integrators/merge_grid.h"
 #include "integrators/path_kernel.h"
 #include "renderer/transport/subpath.h"
 
@@ -36,6 +37,21 @@ struct LightPaths {
   // Starts the subpath of an item on the batch.
   void start(SubpathBatch& batch, uint64_t item) const;
 };
+
+// Merging of eye vertices with the light vertices of a pass (vertex connection and merging).
+struct Merging {
+  const MergeGrid* grid = nullptr;
+  double connectWeight = 0, mergeWeight = 0;  // WalkSettings
+  float normalization = 0;                    // 1 / (π r² · light subpaths)
+};
+
+// The walks of a plan's subpaths; merging may be null.
+WalkSettings bidirectionalWalk(const Plan& plan, Transport transport, const Merging* merging);
+
+// The item of a pixel of the full frame, by which its random numbers are keyed.
+inline uint64_t pixelItem(const Plan& plan, int x, int y) {
+  return static_cast<uint64_t>(y) * static_cast<uint64_t>(plan.settings.width) + static_cast<uint64_t>(x);
+}
 
 // Follows connections that may be blocked, up to a batch at a time, and hands out what is visible.
 class ConnectionQueue {
@@ -69,7 +85,8 @@ class ConnectionQueue {
 class BidirectionalKernel {
  public:
   BidirectionalKernel(const PassRequest& request, const LightPaths& lights, const PassSampler& eyeSampler,
-                      const MediaStack& cameraMedia, PassTarget& target, StrategyObserver* observer = nullptr);
+                      const MediaStack& cameraMedia, PassTarget& target, StrategyObserver* observer = nullptr,
+                      const Merging* merging = nullptr);
 
   // Renders up to kBatch pixels (full-frame coordinates) and stores their samples; splats go anywhere.
   void render(const std::vector<std::pair<int, int>>& pixels);
@@ -87,6 +104,7 @@ class BidirectionalKernel {
   bool recordFeatures(int index, const SubpathVertex& vertex);
   void sampleLight(int index, const SubpathVertex& vertex, bool forFeatures);
   void connect(int index, const SubpathVertex& eye);
+  void merge(int index, const SubpathVertex& eye);
   void deliver(const ConnectionQueue::Entry& entry);
   void add(int index, int s, int t, const Spectrum& value);
 
@@ -99,7 +117,8 @@ class BidirectionalKernel {
   MediaStack cameraMedia_;
   PassTarget& target_;
   StrategyObserver* observer_;
-  WalkSettings eyeSettings_;
+  const Merging* merging_;
+  double mergeWeight_;  // 0 without merging
   SubpathBatch light_, eye_;
   ConnectionQueue queue_;
   const std::vector<std::pair<int, int>>* pixels_ = nullptr;
@@ -117,5 +136,8 @@ class BidirectionalKernel {
   };
   std::vector<Candidate> candidate_;
 };
+
+// Renders the pixels of a tile in batches.
+void renderTile(BidirectionalKernel& kernel, const PixelWindow& tile);
 
 }  // namespace braid
