@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/transport/light_reach.h"
+
+#include <algorithm>
+#include <bit>
+#include <map>
+#include <unordered_map>
+
+#include "renderer/transport/light_emission.h"
+#include "renderer/transport/subpath.h"
+
+namespace braid {
+
+namespace {
+
+constexpr uint64_t kPaths = 16384;
+constexpr int kEyePaths = 16384;
+constexpr uint64_t kSeed = 0x7265616368;
+constexpr int kMaxSegments = 12;
+// A direction density above this is focusing: more than a tenth of the light within 0.02 sr or so.
+constexpr float kFocusingPdf = 10;
+// No camera path is expected to find a light by chance more rarely than this; keeps point lights finite.
+constexpr double kLeastProbability = 1e-6;
+
+// Areas of the lamps: of all emissive triangles of a mesh together, because any of them will do for a path.
+std::map<uint32_t, double> lampAreas(const Scene& scene) {
+  std::map<uint32_t, double> areas;
+  for (const EmissiveTriangle& e : scene.emitters()) areas[e.mesh] += static_cast<double>(e.area);
+  return areas;
+}
+
+// Share of the hemisphere that the lamp fills, seen over `length` metres of path.
+double chanceToHit(double area, float length) {
+  const double share = area / (static_cast<double>(kPi) * sqr(static_cast<double>(length)));
+  return std::clamp(share, kLeastProbability, 1.0);
+}
+
+// Where in space the camera sees rough surfaces, also over mirrors and through glass: cells that grow with the distance
+// from the camera, each with the weight that its surfaces have in the image.
+class VisibleCells {
+ public:
+  explicit VisibleCells(const Vec3& camera, float smallest) : camera_(camera), smallest_(smallest) {}
+  void add(const Vec3& p, double weight) { cells_[keyOf(p, sizeOf(p))] += weight; }
+  // Weight per m² of surface at a point.
+  double density(const Vec3& p) const {
+    const float size = sizeOf(p);
+    const auto found = cells_.find(keyOf(p, size));
+    return found == cells_.end() ? 0 : found->second / sqr(static_cast<double>(size));
+  }
+
+ private:
+  // About three degrees wide.
+  float sizeOf(const Vec3& p) const {
+    return std::exp2(std::floor(std::log2(std::max(0.05f * glm::length(p - camera_), smallest_))));
+  }
+  uint64_t keyOf(const Vec3& p, float size) const {
+    const Vec3 cell = glm::floor((p - camera_) / size);
+    uint64_t key = std::bit_cast<uint32_t>(size);
+    for (int c = 0; c < 3; ++c) key = hashCombine(key, std::bit_cast<uint32_t>(cell[c] + 0.0f));
+    return key;
+  }
+  Vec3 camera_;
+  float smallest_;
+  std::unordered_map<uint64_t, double> cells_;
+};
+
+WalkSettings probeWalk(Transport transport) {
+  WalkSettings settings;
+  settings.transport = transport;
+  settings.maxSegments = kMaxSegments;
+  settings.rouletteStart = transport == Transport::Power ? 1 : kMaxSegments;
+  settings.mis = false;
+  return settings;
+}
+
+VisibleCells findVisibleCells(const TransportContext& context, const PassSampler& sampler, const Camera& camera,
+                              int width, int height) {
+  VisibleCells cells(camera.position(), 1e-6f * context.scene.traits().radius);
+  SubpathBatch batch(context, sampler, probeWalk(Transport::Radiance));
+  const auto onHit = [&](int, const SubpathState& state, const SubpathVertex& vertex) {
+    if (!(state.leastPdfW > kFocusingPdf)) return false;
+    if (vertex.bsdf.hasNonDelta()) cells.add(vertex.hit.position, static_cast<double>(average(vertex.throughput)));
+    return true;
+  };
+  for (int first = 0; first < kEyePaths; first += kBatch) {
+    batch.clear();
+    for (int i = first; i < first + kBatch; ++i) {
+      const uint64_t key = sampler.itemKey(kPaths + static_cast<uint64_t>(i));
+      const SampleBlock u = sampler.block(key, 0);
+      // Rows of the frame are stratified.
+      const Vec2 raster(u.u[slot::kPixelX] * static_cast<float>(width),
+                        (static_cast<float>(i) + u.u[slot::kPixelY]) / kEyePaths * static_cast<float>(height));
+      batch.startCamera(key, camera.ray(raster), MediaStack(), 1, 1, camera.orthographic());
+    }
+    batch.run(onHit, [](int, const SubpathState&) {});
+  }
+  return cells;
+}
+
+}  // namespace
+
+LightReach measureLightReach(const TransportContext& context, const Camera& camera, int width, int height) {
+  LightReach reach;
+  const Scene& scene = context.scene;
+  const LightEmission emission(scene, context.lights);
+  if (emission.empty()) return reach;
+  const PassSampler sampler(SamplerKind::Independent, kSeed, 0, 0, 1);
+  const VisibleCells visible = findVisibleCells(context, sampler, camera, width, height);
+  const std::map<uint32_t, double> areas = lampAreas(scene);
+  double total = 0;
+  const auto onHit = [&](int, const SubpathState& state, const SubpathVertex& vertex) {
+    if (vertex.woBelow) return false;
+    if (!vertex.bsdf.hasNonDelta()) return true;
+    const double density = visible.density(vertex.hit.position);
+    const double value = density * static_cast<double>(average(vertex.throughput * vertex.bsdf.albedo()));
+    if (!(value > 0) || !std::isfinite(value)) return true;
+    ++reach.arrivals;
+    total += value;
+    if (vertex.segments == 1) {
+      reach.direct += value;
+    } else if (state.leastPdfW > kFocusingPdf) {
+      reach.caustic += value;
+      // Points and directions cannot be hit at all.
+      const bool lamp = state.light < context.lights.firstPositional();
+      reach.causticVariance +=
+          value / chanceToHit(lamp ? areas.at(scene.emitters()[state.light].mesh) : 0, state.travelled);
+    } else {
+      reach.indirect += value;
+    }
+    return true;
+  };
+
+  SubpathBatch batch(context, sampler, probeWalk(Transport::Power));
+  for (uint64_t first = 0; first < kPaths; first += kBatch) {
+    batch.clear();
+    for (uint64_t item = first; item < first + kBatch; ++item) {
+      const uint64_t key = sampler.itemKey(item);
+      const SampleBlock u = sampler.block(key, 1);
+      const double select = (static_cast<double>(item) + static_cast<double>(u.u[slot::kLightSelect])) / kPaths;
+      LightStart start;
+      const bool ok = emission.sample(select, {u.u[slot::kLightU], u.u[slot::kLightV]},
+                                      {u.u[slot::kBsdfU], u.u[slot::kBsdfV]}, start);
+      // The environment fills so much of what surfaces see that camera paths find it.
+      if (ok && start.light != context.lights.environmentLight())
+        batch.startLight(key, start, emission.mediaAt(start.light));
+      else
+        batch.startNothing();
+    }
+    batch.run(onHit, [](int, const SubpathState&) {});
+  }
+  reach.paths = kPaths;
+  if (total > 0)
+    for (double* share : {&reach.direct, &reach.indirect, &reach.caustic, &reach.causticVariance}) *share /= total;
+  return reach;
+}
+
+}  // namespace braid

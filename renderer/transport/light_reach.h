@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// How the light of a scene reaches what the camera sees, measured with a few thousand light subpaths: the plan decides
+// from it whether light subpaths are worth their time.
+#pragma once
+
+#include "renderer/scene/camera.h"
+#include "renderer/transport/context.h"
+
+namespace braid {
+
+// Shares of the light that finite and directional lights send to rough surfaces which the camera sees, directly or over
+// mirrors and through glass.
+struct LightReach {
+  uint64_t paths = 0;     // light subpaths traced; 0: there is no such light
+  uint64_t arrivals = 0;  // of them at surfaces in view
+  double direct = 0;      // arriving straight from a light
+  double indirect = 0;    // after scattering, the last time from a rough surface
+  double caustic = 0;     // the last time from a mirror, a lens or another surface that focuses
+  // Relative variance that caustics give to one camera path which can only find them by chance: Σ share / probability
+  // of hitting the light over the focusing surface. 1 is as bad as a signal that one path in two sees.
+  double causticVariance = 0;
+};
+
+// A pure function of the scene and the camera. Costs about as much as a pass of 128 x 128 pixels.
+LightReach measureLightReach(const TransportContext& context, const Camera& camera, int width, int height);
+
+}  // namespace braid
