@@ -35,7 +35,9 @@ class BidirectionalPathTracer final : public Integrator {
     return "bidirectional path tracing, all connections with the power heuristic";
   }
   bool splats() const override { return true; }
-  Applies applies(const SceneTraits& traits) const override { return lightPathsApply(traits); }
+  Applies applies(const SceneTraits& traits, const LightReach& reach) const override {
+    return lightSubpathsApply(traits, reach);
+  }
   std::shared_ptr<const Preparation> prepare(const TransportContext& context, const Plan&) const override {
     return std::make_shared<LightPreparation>(context);
   }

@@ -24,7 +24,7 @@ Rendering render(const Scene& scene, const RenderPlan& plan, const Session::Prog
   Rendering r{Session(scene, plan.plan).run(progress), {}};
   ExrOptions options;
   options.quarters = plan.plan.settings.quarters;
-  for (const NamedPlane& p : namedPlanes(*r.estimates, r.image, r.alpha ? &*r.alpha : nullptr, options))
+  for (const ExrChannel& p : namedPlanes(*r.estimates, r.image, r.alpha ? &*r.alpha : nullptr, options))
     r.planes.emplace(p.name, *p.plane);
   return r;
 }

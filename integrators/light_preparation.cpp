@@ -4,9 +4,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 namespace braid {
 
 namespace {
+
+// Where light subpaths pay. On the suite at equal time photons win by 1.9x and more on the six scenes that these bounds
+// admit, and lose or draw on all others: caustics found by chance only (causticVariance 32 to 4700 against below 0.1),
+// or lights hidden from nearly everything in view (lit 0.03 and 0.04 against 0.2 and more), provided that photons
+// arrive at all (6 % of them against 1 %).
+constexpr double kCausticVariance = 10;
+constexpr double kHiddenLights = 0.1;
+constexpr double kArrivals = 0.03;
 
 // The unit of splats follows the irradiance that the lights would give on the scene's sphere, so that scaling all
 // lights by a power of two scales the image and nothing else.
@@ -29,12 +39,22 @@ LightPreparation::Ref::Ref(const PassRequest& request) {
   used_ = own_.get();
 }
 
-Applies lightPathsApply(const SceneTraits& traits) {
+Applies lightSubpathsApply(const SceneTraits& traits, const LightReach& reach) {
   if (!traits.has(kTraitEmissiveTriangles | kTraitPointLights | kTraitDirectionalLights))
-    return {false, "only the environment lights the scene: eye paths find it"};
-  if (!traits.has(kTraitSmoothSpecular | kTraitTransmission))
-    return {false, "no smooth or transmissive surface can focus light into a caustic"};
-  return {true, "finite lights and surfaces that can cast caustics"};
+    return {false, "only the environment lights the scene: camera paths find it"};
+  const double arrivals = reach.paths > 0 ? static_cast<double>(reach.arrivals) / static_cast<double>(reach.paths) : 0;
+  if (reach.causticVariance > kCausticVariance)
+    return {true, fmt::format("caustics are {:.2g} % of the light in view and would give camera paths {:.2g} times the "
+                              "variance of all the rest",
+                              100 * reach.caustic, reach.causticVariance)};
+  if (reach.lit < kHiddenLights && arrivals > kArrivals)
+    return {true,
+            fmt::format("light samples succeed on {:.2g} % of the view only, and {:.2g} % of light subpaths arrive",
+                        100 * reach.lit, 100 * arrivals)};
+  return {false,
+          fmt::format("no caustics to speak of ({:.2g} % of the light in view), and camera paths see lights from "
+                      "{:.2g} % of the view or light subpaths hardly arrive ({:.2g} %)",
+                      100 * reach.caustic, 100 * reach.lit, 100 * arrivals)};
 }
 
 MediaStack mediaOfCamera(const Scene& scene, const Camera& camera) {

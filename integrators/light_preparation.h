@@ -24,8 +24,8 @@ struct LightPreparation : Preparation {
   };
 };
 
-// Whether light subpaths can find light that eye subpaths miss.
-Applies lightPathsApply(const SceneTraits& traits);
+// Whether light subpaths find light that camera paths find by rare chance only: caustics, or lights behind a gap.
+Applies lightSubpathsApply(const SceneTraits& traits, const LightReach& reach);
 
 // The solids that the camera is inside of.
 MediaStack mediaOfCamera(const Scene& scene, const Camera& camera);

@@ -14,7 +14,6 @@ namespace {
 // Shadow rays stop this share of their length before the light, so that its own triangle does not shadow it.
 constexpr float kShadowLength = 1 - 1e-4f;
 constexpr int kMaxNullCrossings = 256;
-constexpr int kRouletteStart = 4;  // segments before Russian roulette begins
 
 // The normal by which lights are chosen at a hit.
 const Vec3& receiverNormal(const Hit& hit, bool twoSided) { return twoSided ? hit.ng : hit.frame.n; }
@@ -174,8 +173,8 @@ bool PathKernel::scatter(PathState& path, const Hit& hit, const Bsdf& bsdf, bool
   path.lastPdfW = sample.pdfW;
   path.lightCouldNotBeSampled = sample.delta;
 
-  if (path.segments >= kRouletteStart) {
-    const float survive = std::min(1.0f, maxComponent(path.throughput) / path.etaScale);
+  if (path.segments >= roulette_.start) {
+    const float survive = std::min(1.0f, maxComponent(path.throughput) / path.etaScale / roulette_.level);
     if (survive < 1) {
       if (!(block.u[slot::kRoulette] < survive)) return false;
       path.throughput /= survive;

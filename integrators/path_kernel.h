@@ -43,12 +43,13 @@ class PathObserver {
 class PathKernel {
  public:
   PathKernel(const TransportContext& context, const Plan& plan, const PassSampler& sampler,
-             std::vector<RecordedRay>* record)
+             std::vector<RecordedRay>* record, const Roulette& roulette = {})
       : context_(context),
         scene_(context.scene),
         plan_(plan),
         sampler_(sampler),
         record_(record),
+        roulette_(roulette),
         wantFeatures_(plan.features),
         filtered_(context.scene.accel().filtered()) {
     if (scene_.traits().has(kTraitVolume))
@@ -66,7 +67,7 @@ class PathKernel {
 
   uint64_t rayCount = 0, shadowRayCount = 0;
 
- private:
+ protected:
   void queueRay(int slot, PathState& path);
   void traceActive();
   void prefetchHits() const;
@@ -91,6 +92,7 @@ class PathKernel {
   const PassSampler& sampler_;
   std::vector<RecordedRay>* record_;
   PathObserver* observer_ = nullptr;
+  Roulette roulette_;
   bool wantFeatures_, filtered_;
   MediaStack cameraMedia_;  // the solids that the camera is inside of
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Path tracing: one camera path per pixel and pass, random numbers of its own for every pixel.
+#include "integrators/light_preparation.h"
 #include "integrators/path_kernel.h"
 #include "integrators/registry.h"
 #include "integrators/tiles.h"
@@ -16,7 +17,10 @@ class PathTracer final : public Integrator {
   const char* description() const override {
     return "path tracing, next-event estimation and BSDF sampling with the power heuristic";
   }
-  Applies applies(const SceneTraits&) const override { return {true, "unbiased for every scene"}; }
+  Applies applies(const SceneTraits& traits, const LightReach& reach) const override {
+    if (lightSubpathsApply(traits, reach).yes) return {false, "bdpt has all its ways to find light, and more"};
+    return {true, "unbiased for every scene"};
+  }
 
   std::unique_ptr<PassSampler> pixelSampler(const Plan& plan, uint64_t pass) const override {
     return std::make_unique<PassSampler>(plan.settings.sampler, plan.settings.seed, kStream, pass);

@@ -63,9 +63,13 @@ class VertexConnectionAndMerging final : public Integrator {
   const char* description() const override { return "vertex connection and merging, with shrinking radii"; }
   bool unbiased() const override { return false; }
   bool splats() const override { return true; }
-  Applies applies(const SceneTraits& traits) const override {
-    const Applies light = lightPathsApply(traits);
-    return {false, light.yes ? "a competitor to measure combiners against: on request only" : light.reason};
+  Applies applies(const SceneTraits&, const LightReach&) const override {
+    return {false, "weighs all its paths into one image, which leaves combiners nothing to choose: on request only"};
+  }
+  WorkingMemory workingMemory(const Plan& plan) const override {
+    // Light subpaths of a dozen vertices would be unusual; Russian roulette ends most after three.
+    const uint64_t pixels = static_cast<uint64_t>(plan.window.width()) * static_cast<uint64_t>(plan.window.height());
+    return {pixels * 4 * 2 * sizeof(MergeVertex), "for light vertices, four for every pixel"};
   }
   std::shared_ptr<const Preparation> prepare(const TransportContext& context, const Plan& plan) const override {
     return std::make_shared<MergePreparation>(context, plan);

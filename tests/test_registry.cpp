@@ -68,11 +68,11 @@ bool sameBits(const RenderResult& a, const RenderResult& b) {
          sameBits(f.normal.variance, g.normal.variance);
 }
 
-// Finite everywhere and nowhere negative.
-bool sane(const Rgb<float>& image) {
+// Finite everywhere and nowhere negative, unless noise may be.
+bool sane(const Rgb<float>& image, bool mayBeNegative = false) {
   for (size_t c = 0; c < 3; ++c)
     for (const float v : image[c].data)
-      if (!std::isfinite(v) || v < 0) return false;
+      if (!std::isfinite(v) || (v < 0 && !mayBeNegative)) return false;
   return !image.empty();
 }
 
@@ -159,12 +159,19 @@ TEST_CASE("An unknown integrator is refused with a list of the known ones") {
   for (const auto& i : all) CHECK(text.find(i->name()) != std::string::npos);
 }
 
-TEST_CASE("Inside a furnace every unbiased integrator sees the closed form") {
+namespace {
+
+// How far the expectation of a few passes may be from the truth, relative: photons and merged vertices blur over a few
+// pixels, and at corners they miss what lies around them.
+double allowedBias(const Integrator& integrator) { return integrator.unbiased() ? 0.0 : 0.02; }
+
+}  // namespace
+
+TEST_CASE("Inside a furnace every integrator sees the closed form") {
   const Integrators all = makeIntegrators();
   for (const float albedo : {0.0f, 0.5f, 0.8f}) {
     const Scene scene(furnace(albedo, 1));
     for (const auto& i : all) {
-      if (!i->unbiased()) continue;
       Settings settings = smallFrame(16, 16, 1, i->name());
       settings.maxDepth = 200;
       const std::vector<MeanAndError> m = meansOfPasses(scene, *i, settings, 48, all);
@@ -173,13 +180,13 @@ TEST_CASE("Inside a furnace every unbiased integrator sees the closed form") {
       // 4 standard errors by Student's t with 47 degrees of freedom: a false alarm in 4500 runs for each integrator and
       // albedo. Rounding of the mean of floats allows 10⁻⁶ more.
       const double expected = 1 / (1 - static_cast<double>(albedo));
-      CHECK(std::fabs(m[0].mean - expected) <= 4 * m[0].error + 1e-6 * expected);
+      CHECK(std::fabs(m[0].mean - expected) <= 4 * m[0].error + (1e-6 + allowedBias(*i)) * expected);
       CHECK(m[0].error < 0.02 * expected);
     }
   }
 }
 
-TEST_CASE("Unbiased integrators agree on a Cornell box") {
+TEST_CASE("Integrators agree on a Cornell box") {
   constexpr double kFalseAlarm = 1e-3;  // of all comparisons together
   const Scene scene(cornellBox());
   const Integrators all = makeIntegrators();
@@ -189,10 +196,12 @@ TEST_CASE("Unbiased integrators agree on a Cornell box") {
   REQUIRE(pt != all.end());
   const std::vector<MeanAndError> expected = meansOfPasses(scene, **pt, reference, 400, all);
   for (const auto& i : all) {
-    if (!i->unbiased()) continue;
     const std::vector<MeanAndError> m = meansOfPasses(scene, *i, smallFrame(12, 12, 1, i->name()), 400, all);
     for (size_t k = 0; k < m.size(); ++k) {
-      const double z = std::fabs(m[k].mean - expected[k].mean) / std::hypot(m[k].error, expected[k].error);
+      // A frame of 12 x 12 pixels has wide ones: what is merged over five of them is an eighth of the picture.
+      const double bias = 4 * allowedBias(*i) * expected[k].mean;
+      const double distance = std::max(0.0, std::fabs(m[k].mean - expected[k].mean) - bias);
+      const double z = distance / std::hypot(m[k].error, expected[k].error);
       CAPTURE(std::string(i->name()));
       CAPTURE(k);
       CHECK(std::erfc(z / std::sqrt(2.0)) > test::sidak(kFalseAlarm, static_cast<int>(m.size() * all.size())));
@@ -229,7 +238,7 @@ TEST_CASE("Images of real scenes are finite and nowhere negative") {
       CAPTURE(std::string(file));
       CAPTURE(std::string(i->name()));
       CHECK(r.rejected == 0);
-      CHECK(sane(r.image));
+      CHECK(sane(r.image, i->mayBeNegative()));
       CHECK(sane(r.estimates->estimates[0].variance));
       CHECK(sane(r.estimates->features->albedo.mean));
       CHECK(means(r.image)[0] > 0);
@@ -247,14 +256,14 @@ TEST_CASE("Frames of any shape and crops of them render") {
       CAPTURE(width);
       CHECK(r.image.width() == width);
       CHECK(r.image.height() == height);
-      CHECK(sane(r.image));
+      CHECK(sane(r.image, i->mayBeNegative()));
     }
     Settings settings = smallFrame(40, 30, 3, i->name());
     settings.crop = PixelWindow{7, 11, 26, 14};
     const RenderResult r = render(scene, settings, all);
     CHECK(r.image.width() == 19);
     CHECK(r.image.height() == 3);
-    CHECK(sane(r.image));
+    CHECK(sane(r.image, i->mayBeNegative()));
   }
 }
 
@@ -334,7 +343,8 @@ TEST_CASE("A transparent background gives the share of each pixel that is covere
     for (int y = 0; y < 16; ++y)
       for (int x = 0; x < 16; ++x) {
         const float a = r.alpha->at(x, y);
-        if (x >= 8) {
+        if (x == 8) continue;  // a ray may graze the edge of the quad
+        if (x > 8) {
           CHECK(a == 0);
           CHECK(r.image.pixel(r.alpha->index(x, y)) == Vec3(0));
         } else {
@@ -342,7 +352,8 @@ TEST_CASE("A transparent background gives the share of each pixel that is covere
           CHECK((a > 0.1f && a < 0.5f));
         }
       }
-    // 128 pixels × 256 samples of a coin: 4 standard deviations are 0.0101.
-    CHECK(std::fabs(covered - 0.3) < 0.0102);
+    // 128 pixels × 256 samples of a coin: 4 standard deviations are 0.0101. With common random numbers all pixels of a
+    // pass see the same coin: 256 samples, 0.1146.
+    CHECK(std::fabs(covered - 0.3) < (i->correlation() == Correlation::CommonRandomNumbers ? 0.1146 : 0.0102));
   }
 }

@@ -12,6 +12,7 @@
 #include <tbb/task_arena.h>
 
 #include "integrators/registry.h"
+#include "integrators/sppm_throughput.h"
 #include "renderer/core/hash.h"
 #include "tools/builtin_scenes.h"
 #include "tools/cli.h"
@@ -98,6 +99,23 @@ struct SceneSource {
   std::function<SceneData()> load;
 };
 
+// The halves of photon mapping by themselves, for one thread: medians over the repeats.
+nlohmann::json benchPhotons(const TransportContext& context, const Plan& plan, int repeats) {
+  std::vector<double> segments, queries, sorting;
+  PhotonThroughput last;
+  for (int repeat = 0; repeat < repeats; ++repeat) {
+    last = measurePhotonThroughput(context, plan);
+    segments.push_back(last.segmentsPerSecond);
+    queries.push_back(last.queriesPerSecond);
+    sorting.push_back(last.sortSeconds);
+  }
+  return {{"segmentsPerSecond", median(segments)},
+          {"queriesPerSecond", median(queries)},
+          {"photonsPerQuery", last.photonsPerQuery},
+          {"storedPerPath", last.storedPerPath},
+          {"sortSeconds", median(sorting)}};
+}
+
 nlohmann::json benchScene(const SceneSource& source, const BenchOptions& o, const Settings& settings) {
   const double loadStart = now();
   SceneData data = source.load();
@@ -176,6 +194,7 @@ nlohmann::json benchScene(const SceneSource& source, const BenchOptions& o, cons
           {"sceneBytesPerTriangle", sceneBytes / std::max<double>(1, static_cast<double>(scene.traits().triangles))},
           {"filmBytesPerPixel", plan.filmBytesPerPixel},
           {"lightBytes", context.lights.bytes()},
+          {"photons", benchPhotons(context, plan, o.repeats)},
           {"peakMemoryBytes", peakMemory()}};
 }
 
@@ -215,6 +234,12 @@ int runBench(const BenchOptions& o) {
         "M rays/s in random order (ratio {:.3f})\n",
         r["rawRaysPerSecond"].get<double>() * 1e-6, r["ratio"].get<double>(),
         r["rawIncoherentRaysPerSecond"].get<double>() * 1e-6, r["incoherentRatio"].get<double>());
+    const nlohmann::json& photons = r["photons"];
+    fmt::print(
+        "  photons on one thread: {:.2f} M segments/s, {:.2f} M gather queries/s with {:.1f} photons each, {:.3f} s to "
+        "sort a pass\n",
+        photons["segmentsPerSecond"].get<double>() * 1e-6, photons["queriesPerSecond"].get<double>() * 1e-6,
+        photons["photonsPerQuery"].get<double>(), photons["sortSeconds"].get<double>());
     fmt::print(
         "  load {:.3f} s, hierarchies {:.3f} s, {:.1f} bytes a triangle in hierarchies, {:.1f} in all; film {} bytes a "
         "pixel; peak {:.0f} MiB\n",

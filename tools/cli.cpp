@@ -57,6 +57,8 @@ T choose(const std::string& name, const char* option, const std::vector<std::pai
   throw Error(ExitCode::Usage, fmt::format("unknown {} '{}': known are {}", option, name, known));
 }
 
+}  // namespace
+
 std::vector<std::string> splitList(const std::string& text) {
   std::vector<std::string> list;
   size_t begin = 0;
@@ -67,8 +69,6 @@ std::vector<std::string> splitList(const std::string& text) {
   }
   return list;
 }
-
-}  // namespace
 
 double parseDuration(const std::string& text) {
   double total = 0;
@@ -128,6 +128,14 @@ void addSampleOptions(CLI::App& command, SampleChoice& c) {
   command.add_option("--threads", c.threads, "Worker threads (default: all)")->check(CLI::Range(0, 4096));
   command.add_option("--clamp", c.clamp, "Clamp a path's radiance (biased; off by default)")
       ->check(CLI::NonNegativeNumber);
+  command.add_option("--photons", c.photons, "Light paths of a photon mapping pass (default: one per pixel)")
+      ->check(CLI::Range(uint64_t(1), uint64_t(1) << 28));
+  command.add_option("--photon-radius", c.photonRadius, "First gather radius of photon mapping, in pixels")
+      ->capture_default_str()
+      ->check(CLI::Range(0.01, 1000.0));
+  command.add_flag("--photon-direct", c.photonDirect, "Photon mapping for direct light too");
+  command.add_flag("--no-photon-aiming", c.noPhotonAiming,
+                   "Choose photons' lights by power alone, not also by what arrives where the camera looks");
 }
 
 SceneData loadScene(const SceneChoice& c, LoadTimes* times) {
@@ -227,6 +235,10 @@ Settings makeSettings(const SceneChoice& scene, const SampleChoice& samples) {
       {{"auto", LightStrategy::Automatic}, {"power", LightStrategy::Power}, {"hierarchy", LightStrategy::Hierarchy}});
   s.threads = samples.threads;
   s.clamp = static_cast<float>(samples.clamp);
+  s.photons = samples.photons;
+  s.photonRadius = static_cast<float>(samples.photonRadius);
+  s.photonDirect = samples.photonDirect;
+  s.photonAiming = !samples.noPhotonAiming;
   return s;
 }
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -25,6 +26,11 @@ void addInfo(CLI::App& app, Action& action);
 void addBench(CLI::App& app, Action& action);
 void addReplay(CLI::App& app, Action& action);
 void addCompare(CLI::App& app, std::function<int()>& action);
+void addCombine(CLI::App& app, Action& action);
+void addSweep(CLI::App& app, Action& action);
+
+// The items between commas, without empty ones.
+std::vector<std::string> splitList(const std::string& text);
 
 // Seconds from `90`, `90s`, `2m`, `1h` or a sum such as `1h30m`. Throws Error(Usage).
 double parseDuration(const std::string& text);
@@ -68,6 +74,9 @@ struct SampleChoice {
   uint64_t seed = 0;
   int threads = 0;
   double clamp = 0;
+  uint64_t photons = 0;
+  double photonRadius = 5;
+  bool photonDirect = false, noPhotonAiming = false;
 };
 void addSampleOptions(CLI::App& command, SampleChoice& choice);
 

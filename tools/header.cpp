@@ -5,6 +5,7 @@
 
 #include "renderer/core/hash.h"
 #include "renderer/session/pixel_filter.h"
+#include "tools/estimates_file.h"
 #include "version.h"
 
 namespace braid {
@@ -72,10 +73,8 @@ std::vector<Attribute> headerAttributes(const Scene& scene, const Session& sessi
       matrix("worldToNDC", plan.camera.worldToNdc()),
   };
   if (s.clamp > 0) list.push_back(number("braid/clamp", static_cast<double>(s.clamp)));
-  for (const Estimate& e : result.estimates->estimates) {
-    list.push_back(integer("braid/" + e.name + "/passes", e.passes));
-    if (timing) list.push_back(number("braid/" + e.name + "/seconds", e.seconds));
-  }
+  for (Attribute& a : estimateAttributes(*result.estimates, timing))
+    if (a.name != "braid/seed") list.push_back(std::move(a));
   if (timing) list.push_back(number("renderTimeSeconds", result.seconds));
   return list;
 }

@@ -17,12 +17,14 @@ int main(int argc, char** argv) {
   app.set_help_flag("-h,--help", "Print this help and exit");
   app.require_subcommand(0, 1);
   bool list = false;
-  app.add_flag("--list", list, "Print every registered integrator and metric");
+  app.add_flag("--list", list, "Print every registered integrator, denoiser, combiner and metric");
   Action action;
   addRender(app, action);
   addPlan(app, action);
   addInfo(app, action);
   addCompare(app, action);
+  addCombine(app, action);
+  addSweep(app, action);
   addReplay(app, action);
   addBench(app, action);
 

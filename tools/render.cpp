@@ -1,10 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // `braid render`: a glTF scene to a multilayer EXR.
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
-#include <unistd.h>
-
 #include <fmt/format.h>
 
 #include "integrators/registry.h"
@@ -12,8 +7,10 @@
 #include "renderer/core/hash.h"
 #include "renderer/film/exr.h"
 #include "tools/cli.h"
+#include "tools/combining.h"
 #include "tools/header.h"
 #include "tools/interrupt.h"
+#include "tools/output_options.h"
 #include "tools/progress_line.h"
 
 namespace braid {
@@ -25,33 +22,12 @@ struct RenderOptions {
   SampleChoice samples;
   std::string output, png, aovs = "all", logJson, layerPrefix;
   double exposure = 0;
-  bool quarters = false, floatHeadline = false, transparent = false, noTiming = false;
+  bool quarters = false, history = false, floatHeadline = false, transparent = false, noTiming = false;
+  CombineChoice combine;
 };
 
-AovSet parseAovs(const std::string& name) {
-  if (name == "none") return AovSet::None;
-  if (name == "features") return AovSet::Features;
-  if (name == "all") return AovSet::All;
-  throw Error(ExitCode::Usage, "unknown --aovs '" + name + "': known are none, features, all");
-}
-
-// Finds out before hours of rendering that the result could not be saved.
-void checkWritable(const std::string& path) {
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  const std::string name = folder.empty() ? "." : folder.string();
-  std::error_code ignored;
-  if (!std::filesystem::is_directory(name, ignored))
-    throw Error(ExitCode::OutputFailed,
-                fmt::format("{}: the folder {} does not exist: create it or choose another output", path, name));
-  if (access(name.c_str(), W_OK) != 0)
-    throw Error(ExitCode::OutputFailed,
-                fmt::format("{}: the folder {} is not writable: {}", path, name, std::strerror(errno)));
-  if (std::filesystem::is_directory(path, ignored))
-    throw Error(ExitCode::OutputFailed, fmt::format("{}: is a folder: give a file name", path));
-}
-
 nlohmann::json resultRecord(const RenderResult& r, const RenderOptions& o, double loadSeconds, const Scene& scene,
-                            double writeSeconds) {
+                            double combineSeconds, double writeSeconds) {
   nlohmann::json outputs = nlohmann::json::array({o.output});
   if (!o.png.empty()) outputs.push_back(o.png);
   return {{"status", r.reason == StopReason::Cancelled ? "interrupted" : "done"},
@@ -62,6 +38,7 @@ nlohmann::json resultRecord(const RenderResult& r, const RenderOptions& o, doubl
             {"prepare", scene.buildTimes().prepare},
             {"hierarchy", scene.buildTimes().hierarchy},
             {"render", r.seconds},
+            {"combine", combineSeconds},
             {"write", writeSeconds}}},
           {"paths", r.paths},
           {"rays", r.rays + r.shadowRays},
@@ -74,6 +51,7 @@ int runRender(const RenderOptions& o) {
   Settings settings = makeSettings(o.scene, o.samples);
   settings.features = aovs != AovSet::None;
   settings.quarters = o.quarters;
+  settings.history = o.history;
   settings.transparent = o.transparent;
   checkWritable(o.output);
   if (!o.png.empty()) checkWritable(o.png);
@@ -85,9 +63,13 @@ int runRender(const RenderOptions& o) {
   const CameraData camera = chooseCamera(data, o.scene);
   const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene);
   const auto integrators = makeIntegrators();
+  const std::vector<std::string> wanted = o.combine.wanted();
+  const Recipe recipe = planCombining(*scene, camera, settings, pointersTo(integrators), o.combine);
+  requireRunnable(recipe, wanted);
   Session session(*scene, makePlan(*scene, camera, settings, pointersTo(integrators)));
-  if (o.scene.verbose) fmt::print(stderr, "{}", session.plan().text());
-  json.write("plan", {{"text", session.plan().text()}, {"hash", hexString(session.plan().hash())}});
+  const std::string planText = session.plan().text() + recipeText(recipe);
+  if (o.scene.verbose) fmt::print(stderr, "{}", planText);
+  json.write("plan", {{"text", planText}, {"hash", hexString(session.plan().hash())}});
 
   ProgressLine line(o.scene.quiet);
   RenderResult result = session.run(
@@ -101,7 +83,14 @@ int runRender(const RenderOptions& o) {
 
   Estimates estimates = *result.estimates;
   estimates.attributes = headerAttributes(*scene, session, result, scene->accel().isa(), !o.noTiming);
+  const auto combineStart = std::chrono::steady_clock::now();
+  const PipelineResult combined = runCombining(estimates, o.combine, o.combine.options(), settings.threads);
+  const double combineSeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - combineStart).count();
+  const CombinedLayers layers(combined, wanted, o.combine.weights, !o.noTiming, estimates);
+  if (layers.headline()) result.image = *layers.headline();
   ExrOptions exr;
+  exr.layers = layers.layers();
+  exr.history = o.history;
   exr.aovs = aovs;
   exr.quarters = o.quarters;
   exr.floatHeadline = o.floatHeadline;
@@ -112,6 +101,7 @@ int runRender(const RenderOptions& o) {
   const double writeSeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - writeStart).count();
 
   if (!o.scene.quiet) {
+    for (const std::string& text : combineWarnings(combined)) fmt::print(stderr, "warning: {}\n", text);
     if (report.clampedToHalf > 0)
       fmt::print(stderr, "warning: {}: {} headline values above 65504 were clamped to fit half floats: use --float\n",
                  o.output, report.clampedToHalf);
@@ -125,10 +115,14 @@ int runRender(const RenderOptions& o) {
                result.estimates->estimates.front().passes, formatSeconds(result.seconds),
                static_cast<double>(result.paths) / result.seconds * 1e-6,
                static_cast<double>(result.rays + result.shadowRays) / result.seconds * 1e-6, toString(result.reason));
+    for (const PipelineOutput& out : combined.outputs)
+      if (out.ran())
+        fmt::print(stderr, "{} in {}, its inputs in {}\n", out.step.name, formatSeconds(out.seconds),
+                   formatSeconds(out.inputSeconds));
     fmt::print(stderr, "Saved: {}\n", o.output);
     if (!o.png.empty()) fmt::print(stderr, "Saved: {}\n", o.png);
   }
-  json.write("end", resultRecord(result, o, times.load, *scene, writeSeconds));
+  json.write("end", resultRecord(result, o, times.load, *scene, combineSeconds, writeSeconds));
   return result.reason == StopReason::Cancelled ? static_cast<int>(ExitCode::Interrupted) : 0;
 }
 
@@ -143,11 +137,17 @@ void addRender(CLI::App& app, Action& action) {
       "sky.hdr --png out.png");
   addSceneOptions(*command, o.scene);
   addSampleOptions(*command, o.samples);
+  command
+      ->add_option("--combine", o.combine.combine,
+                   "none, or denoisers and combiners separated by commas (--list); the last one is the image R G B")
+      ->capture_default_str();
+  addCombineOptions(*command, o.combine);
   command->add_option("-o,--output", o.output, "EXR file to write")->required();
   command->add_option("--png", o.png, "Also write a tone-mapped PNG");
   command->add_option("--exposure", o.exposure, "Exposure of the PNG in stops")->capture_default_str();
   command->add_option("--aovs", o.aovs, "Layers besides the image: none, features or all")->capture_default_str();
   command->add_flag("--quarters", o.quarters, "Also write the four quarter buffers");
+  command->add_flag("--history", o.history, "Also write the variances after 1, 2, 4, ... samples, for combining later");
   command->add_flag("--float", o.floatHeadline, "R G B as 32-bit floats");
   command->add_flag("--transparent", o.transparent, "Alpha channel; camera rays that miss add nothing");
   command->add_option("--layer-prefix", o.layerPrefix, "Put before every layer's name, e.g. ViewLayer");

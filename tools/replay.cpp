@@ -117,7 +117,7 @@ int runReplay(const ReplayOptions& o) {
     throw Error(ExitCode::Usage, fmt::format("integrator '{}' has no camera paths to replay", integrator.name()));
 
   PrintingObserver observer(*scene);
-  PathKernel kernel(context, plan, *sampler, nullptr, integrator.rouletteStart());
+  PathKernel kernel(context, plan, *sampler, nullptr, integrator.roulette());
   kernel.observe(&observer);
   fmt::print("{} pass {} pixel {},{} of {}x{}\n", integrator.name(), o.pass, x, y, settings.width, settings.height);
   kernel.start(x, y, integrator.pixelKey(*sampler, plan, x, y));

@@ -44,7 +44,10 @@ struct Needs {
   bool quarters = false;    // of the unbiased (and the correlated) estimate
   bool features = false;    // works without, but worse
   int checkpoints = 0;
-  uint64_t passes = 2;  // of the unbiased estimate
+  uint64_t passes = 2;     // of the unbiased estimate
+  bool halves = true;      // of the unbiased and the biased image and the bases; false: works on the means alone
+  bool variance = true;    // of the unbiased estimate
+  bool redenoise = false;  // the biased image must come from a denoiser, which is run again
 };
 
 // The inputs of one method. Pointers that needs() does not ask for may be null. Widths and heights agree.

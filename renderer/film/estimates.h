@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -12,7 +13,8 @@
 
 namespace braid {
 
-enum class Correlation { Independent, CommonRandomNumbers };
+// What the pixels of one pass share: nothing, their random numbers, or a reconstruction from each other's gradients.
+enum class Correlation { Independent, CommonRandomNumbers, Gradients };
 
 // One integrator's image so far.
 struct Estimate {
@@ -66,6 +68,8 @@ struct Estimates {
   std::vector<Estimate> estimates;
   std::optional<Features> features;
   std::vector<Attribute> attributes;
+  // By name of the estimate: its earlier states at rounds 1, 2, 4, …, oldest first; none unless asked for.
+  std::map<std::string, std::vector<Checkpoint>> history;
 
   const Estimate* find(const std::string& name) const {
     for (const Estimate& e : estimates)

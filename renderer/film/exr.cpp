@@ -49,14 +49,14 @@ class ChannelList {
   }
   void add(const std::string& layer, const char* name, const Plane<float>& plane) { add(layer + "." + name, plane); }
 
-  std::vector<NamedPlane> list() const { return list_; }
+  std::vector<ExrChannel> list() const { return list_; }
 
  private:
   void check(const Plane<float>& plane) const { BRAID_ASSERT(plane.width == width_ && plane.height == height_); }
 
   int width_, height_;
   std::string prefix_;
-  std::vector<NamedPlane> list_;
+  std::vector<ExrChannel> list_;
 };
 
 template <class P, class N>
@@ -73,13 +73,15 @@ void addEstimate(ChannelList& channels, const Estimate& e, bool quarters) {
   channels.add(e.name + ".halfA", kColour, e.half[0]);
   channels.add(e.name + ".halfB", kColour, e.half[1]);
   channels.add(e.name + ".variance", kColour, e.variance);
+  channels.add(e.name + ".bias", kColour, e.bias);
+  channels.add(e.name + ".biasVariance", kColour, e.biasVariance);
   if (!quarters) return;
   for (size_t q = 0; q < e.quarter.size(); ++q) channels.add(e.name + ".q" + std::to_string(q), kColour, e.quarter[q]);
 }
 
 }  // namespace
 
-std::vector<NamedPlane> namedPlanes(const Estimates& estimates, const Rgb<float>& headline, const Plane<float>* alpha,
+std::vector<ExrChannel> namedPlanes(const Estimates& estimates, const Rgb<float>& headline, const Plane<float>* alpha,
                                     const ExrOptions& options) {
   ChannelList channels(headline.width(), headline.height(), options.layerPrefix);
   const bool half = !options.floatHeadline;
@@ -94,7 +96,13 @@ std::vector<NamedPlane> namedPlanes(const Estimates& estimates, const Rgb<float>
     addFeature(channels, "Visibility", "V", f.visibility, all);
   }
   if (!all) return channels.list();
-  for (const Estimate& e : estimates.estimates) addEstimate(channels, e, options.quarters);
+  for (const Estimate& e : estimates.estimates) {
+    addEstimate(channels, e, options.quarters);
+    const auto history = estimates.history.find(e.name);
+    if (!options.history || history == estimates.history.end()) continue;
+    for (const Checkpoint& c : history->second)
+      channels.add(e.name + ".variance" + std::to_string(c.passes), kColour, c.variance);
+  }
   for (const ExrLayer& layer : options.layers)
     if (layer.planes) channels.add(layer.name, kColour, *layer.planes);
   return channels.list();
@@ -129,12 +137,12 @@ void addAttribute(OIIO::ImageSpec& spec, const Attribute& a) {
   }
 }
 
-OIIO::ImageSpec makeSpec(const Estimates& estimates, const std::vector<NamedPlane>& channels) {
+OIIO::ImageSpec makeSpec(const Estimates& estimates, const std::vector<ExrChannel>& channels) {
   using OIIO::TypeDesc;
   const int width = channels[0].plane->width, height = channels[0].plane->height;
   OIIO::ImageSpec spec(width, height, static_cast<int>(channels.size()), TypeDesc::FLOAT);
   spec.channelnames.clear();
-  for (const NamedPlane& c : channels) {
+  for (const ExrChannel& c : channels) {
     spec.channelnames.push_back(c.name);
     spec.channelformats.push_back(c.half ? TypeDesc::HALF : TypeDesc::FLOAT);
     if (c.name == "A") spec.alpha_channel = static_cast<int>(spec.channelnames.size()) - 1;
@@ -161,7 +169,7 @@ OIIO::ImageSpec makeSpec(const Estimates& estimates, const std::vector<NamedPlan
 
 // Copies rows [begin, end) of all planes, interleaved; returns how many values had to be clamped to the range of half
 // floats.
-uint64_t interleave(const std::vector<NamedPlane>& channels, int begin, int end, std::vector<float>& out) {
+uint64_t interleave(const std::vector<ExrChannel>& channels, int begin, int end, std::vector<float>& out) {
   std::atomic<uint64_t> clamped{0};
   const size_t count = channels.size(), width = static_cast<size_t>(channels[0].plane->width);
   parallelRows(end - begin, [&](int row) {
@@ -188,7 +196,7 @@ uint64_t interleave(const std::vector<NamedPlane>& channels, int begin, int end,
 WriteReport writeExr(const std::string& path, const Estimates& estimates, const Rgb<float>& headline,
                      const Plane<float>* alpha, const ExrOptions& options) {
   BRAID_ASSERT(!headline.empty());
-  const std::vector<NamedPlane> channels = namedPlanes(estimates, headline, alpha, options);
+  const std::vector<ExrChannel> channels = namedPlanes(estimates, headline, alpha, options);
   const OIIO::ImageSpec spec = makeSpec(estimates, channels);
 
   OutputFile file(path, ".exr");

@@ -23,20 +23,21 @@ struct ExrLayer {
 struct ExrOptions {
   AovSet aovs = AovSet::All;
   bool quarters = false;         // also <estimate>.q0 … q3
+  bool history = false;          // also <estimate>.variance1, variance2, variance4, …: after so many passes
   bool floatHeadline = false;    // R G B as float instead of half
   std::string layerPrefix;       // e.g. "ViewLayer": put before every channel but R G B A
   std::vector<ExrLayer> layers;  // written with AovSet::All
 };
 
 // A plane under the channel name that it has in files, such as "R", "Albedo.R" or "pt.mean.R".
-struct NamedPlane {
+struct ExrChannel {
   std::string name;
   const Plane<float>* plane;
   bool half = false;  // stored with 16 bits
 };
 
 // The channels that writeExr() writes, in its order; the planes are those of the arguments.
-std::vector<NamedPlane> namedPlanes(const Estimates& estimates, const Rgb<float>& headline, const Plane<float>* alpha,
+std::vector<ExrChannel> namedPlanes(const Estimates& estimates, const Rgb<float>& headline, const Plane<float>* alpha,
                                     const ExrOptions& options);
 
 struct WriteReport {

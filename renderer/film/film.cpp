@@ -47,17 +47,25 @@ void commitRow(const float* __restrict own, const int64_t* __restrict splats, do
 
 }  // namespace
 
-PassTarget::PassTarget(int width, int height, bool splats, bool features, bool coverage)
+PassTarget::PassTarget(int width, int height, bool splats, bool features, bool coverage, bool bias)
     : width_(width), height_(height), own_(width, height) {
   if (splats) splats_.assign(3 * own_.size(), 0);
   if (features) features_.assign(FeatureSample::kComponents, Plane<float>(width, height));
   if (coverage) coverage_ = Plane<float>(width, height);
+  if (bias) bias_ = Rgb<float>(width, height);
 }
 
 bool PassTarget::add(int x, int y, const Spectrum& value) {
   const size_t i = own_[0].index(x, y);
   const bool ok = acceptable(value);
   own_.set(i, ok ? value : Spectrum(0));
+  if (!ok) rejected_.fetch_add(1, std::memory_order_relaxed);
+  return ok;
+}
+
+bool PassTarget::addSigned(int x, int y, const Spectrum& value) {
+  const bool ok = isFinite(value);
+  own_.set(own_[0].index(x, y), ok ? value : Spectrum(0));
   if (!ok) rejected_.fetch_add(1, std::memory_order_relaxed);
   return ok;
 }
@@ -101,12 +109,21 @@ void PassTarget::features(int x, int y, const FeatureSample& sample) {
   if (!ok) rejected_.fetch_add(1, std::memory_order_relaxed);
 }
 
+void PassTarget::bias(int x, int y, const Spectrum& value) {
+  const bool ok = isFinite(value);
+  bias_.set(own_[0].index(x, y), ok ? value : Spectrum(0));
+  if (!ok) rejected_.fetch_add(1, std::memory_order_relaxed);
+}
+
 void PassTarget::clear() {
   const auto width = static_cast<size_t>(width_);
   parallelRows(height_, [&](int y) {
     const size_t begin = static_cast<size_t>(y) * width;
     for (size_t c = 0; c < 3; ++c) std::fill_n(own_[c].data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
     for (Plane<float>& f : features_) std::fill_n(f.data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
+    if (!bias_.empty())
+      for (Plane<float>& b : bias_.channel)
+        std::fill_n(b.data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
     if (!coverage_.empty()) std::fill_n(coverage_.data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
     if (!splats_.empty()) std::fill_n(splats_.begin() + static_cast<std::ptrdiff_t>(3 * begin), 3 * width, int64_t(0));
   });
@@ -114,13 +131,14 @@ void PassTarget::clear() {
   clampedSplats_ = 0;
 }
 
-Accumulator::Accumulator(int width, int height, int buckets)
+Accumulator::Accumulator(int width, int height, int buckets, bool bias)
     : width_(width),
       height_(height),
       sum_(static_cast<size_t>(buckets), Rgb<double>(width, height)),
       sumsq_(width, height),
       count_(static_cast<size_t>(buckets), 0) {
   BRAID_ASSERT(buckets >= 2 && buckets % 2 == 0);
+  if (bias) biasSum_ = biasSumsq_ = Rgb<double>(width, height);
 }
 
 Accumulator Accumulator::fromSums(std::vector<Rgb<double>> sums, Rgb<double> sumOfSquares, std::vector<uint64_t> counts,
@@ -157,9 +175,47 @@ void Accumulator::commit(uint64_t pass, const PassTarget& target) {
         commitRow(own, target.splats_.data() + 3 * begin + c, unit, s, q, width);
     }
   });
+  if (keepsBias()) commitBias(target);
   ++count_[bucket];
   rejected_ += target.rejected();
   clampedSplats_ += target.clampedSplats();
+}
+
+void Accumulator::commitBias(const PassTarget& target) {
+  BRAID_ASSERT(target.wantsBias());
+  const auto width = static_cast<size_t>(width_);
+  parallelRows(height_, [&](int y) {
+    const size_t begin = static_cast<size_t>(y) * width;
+    for (size_t c = 0; c < 3; ++c)
+      commitRow(target.bias_[c].data.data() + begin, biasSum_[c].data.data() + begin, biasSumsq_[c].data.data() + begin,
+                width);
+  });
+}
+
+void Accumulator::setBiasSums(Rgb<double> sum, Rgb<double> sumOfSquares) {
+  BRAID_ASSERT(sum.width() == width_ && sum.height() == height_ && sumOfSquares.size() == sum.size());
+  biasSum_ = std::move(sum);
+  biasSumsq_ = std::move(sumOfSquares);
+}
+
+Rgb<float> Accumulator::biasMean() const {
+  Rgb<float> out(biasSum_.width(), biasSum_.height());
+  const double scale = passes() > 0 ? 1 / static_cast<double>(passes()) : 0.0;
+  for (size_t c = 0; c < 3; ++c)
+    parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) out[c][i] = static_cast<float>(biasSum_[c][i] * scale);
+    });
+  return out;
+}
+
+Rgb<float> Accumulator::biasVariance() const {
+  Rgb<float> out(biasSum_.width(), biasSum_.height());
+  for (size_t c = 0; c < 3; ++c)
+    parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i)
+        out[c][i] = static_cast<float>(varianceOfMean(biasSum_[c][i], biasSumsq_[c][i], passes()));
+    });
+  return out;
 }
 
 uint64_t Accumulator::passes() const {

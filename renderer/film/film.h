@@ -34,16 +34,20 @@ struct FeatureSample {
 // be called by any thread for any pixel: integer sums commute, so the result does not depend on the order.
 class PassTarget {
  public:
-  PassTarget(int width, int height, bool splats, bool features, bool coverage = false);
+  PassTarget(int width, int height, bool splats, bool features, bool coverage = false, bool bias = false);
 
   int width() const { return width_; }
   int height() const { return height_; }
   bool wantsFeatures() const { return !features_.empty(); }
   bool wantsCoverage() const { return !coverage_.empty(); }
+  bool wantsBias() const { return !bias_.empty(); }
 
   // Sets the value of the task's own pixel in this pass. A non-finite or negative value counts as a sample of value 0
   // and is counted as rejected; returns false then.
   bool add(int x, int y, const Spectrum& value);
+  // The same where a negative value is legitimate noise: for integrators that may be negative. Only a non-finite value
+  // is rejected.
+  bool addSigned(int x, int y, const Spectrum& value);
   // Adds to any pixel in fixed point (2⁻³², clamped at 2²² and counted). Returns false when rejected.
   bool splat(int x, int y, const Spectrum& value);
   // Moves the fixed point: unit 2^-bits, clamp at 2^(54-bits); 512 clamped splats fit one pixel and pass. Scenes in
@@ -53,6 +57,10 @@ class PassTarget {
   void features(int x, int y, const FeatureSample& sample);
   // How much of the pixel the camera path saw covered, in [0, 1]; only when wantsCoverage().
   void coverage(int x, int y, float value) { coverage_.at(x, y) = value; }
+
+  // The estimated bias of this pass' value of the pixel, of either sign; only when wantsBias(). A non-finite one counts
+  // as 0 and as rejected.
+  void bias(int x, int y, const Spectrum& value);
 
   // Zeroes everything, for the next pass; keeps the allocation.
   void clear();
@@ -69,18 +77,19 @@ class PassTarget {
   std::vector<int64_t> splats_;         // 3 per pixel, interleaved; empty when the integrator does not splat
   std::vector<Plane<float>> features_;  // FeatureSample::kComponents planes, or empty
   Plane<float> coverage_;               // or empty
+  Rgb<float> bias_;                     // or empty
   double splatScale_ = 4294967296.0;    // fixed-point units per 1
   double splatClamp_ = 4194304.0;
   std::atomic<uint64_t> rejected_{0}, clampedSplats_{0};
 };
 
 // Sums of one integrator's passes. Bucket of a pass = pass % bucketCount(); half A = even buckets, B = odd ones. All
-// pixels have the same count. 120 bytes a pixel with four buckets, 72 with two.
+// pixels have the same count. 120 bytes a pixel with four buckets, 72 with two; 48 more with estimates of the bias.
 class Accumulator {
  public:
-  Accumulator(int width, int height, int buckets);
+  Accumulator(int width, int height, int buckets, bool bias = false);
 
-  // Adds the pass: v = own + splats, sum[pass % K] += v, sumsq += v². Parallel over rows.
+  // Adds the pass: v = own + splats, sum[pass % K] += v, sumsq += v²; likewise the bias. Parallel over rows.
   void commit(uint64_t pass, const PassTarget& target);
 
   int width() const { return width_; }
@@ -102,7 +111,15 @@ class Accumulator {
   // (ALGORITHMS 4.6 step 1); buckets of unequal counts are weighted.
   Rgb<float> variance(bool lowDiscrepancy) const;
 
+  // The mean estimate of the bias and the variance of that mean; empty when bias is not kept.
+  bool keepsBias() const { return !biasSum_.empty(); }
+  Rgb<float> biasMean() const;
+  Rgb<float> biasVariance() const;
+
   // Raw sums, for state files: what a file holds, and back.
+  const Rgb<double>& biasSum() const { return biasSum_; }
+  const Rgb<double>& biasSumOfSquares() const { return biasSumsq_; }
+  void setBiasSums(Rgb<double> sum, Rgb<double> sumOfSquares);
   const std::vector<Rgb<double>>& sums() const { return sum_; }
   const Rgb<double>& sumOfSquares() const { return sumsq_; }
   static Accumulator fromSums(std::vector<Rgb<double>> sums, Rgb<double> sumOfSquares, std::vector<uint64_t> counts,
@@ -110,11 +127,13 @@ class Accumulator {
 
  private:
   Rgb<float> meanOfBuckets(int first, int step) const;
+  void commitBias(const PassTarget& target);
   // Variance of the mean from the spread of the bucket means (independent scrambles).
   Plane<double> bucketVariance(size_t channel) const;
   int width_, height_;
   std::vector<Rgb<double>> sum_;
   Rgb<double> sumsq_;
+  Rgb<double> biasSum_, biasSumsq_;  // or empty
   std::vector<uint64_t> count_;
   uint64_t rejected_ = 0, clampedSplats_ = 0;
 };

@@ -12,8 +12,16 @@
 #include "renderer/film/film.h"
 #include "renderer/session/plan.h"
 #include "renderer/transport/context.h"
+#include "renderer/transport/light_reach.h"
 
 namespace braid {
+
+// Russian roulette of camera paths: from `start` segments on, a path whose throughput is below `level` goes on with
+// probability throughput / level.
+struct Roulette {
+  int start = 4;
+  float level = 1;
+};
 
 // Whether a scene needs an integrator, and why.
 struct Applies {
@@ -30,6 +38,12 @@ struct PassStatistics {
 // What an integrator works out once per render and all its passes read, for instance which lights reach what is seen.
 struct Preparation {
   virtual ~Preparation() = default;
+};
+
+// Memory of a pass besides the film, and what it is for.
+struct WorkingMemory {
+  uint64_t bytes = 0;  // at most
+  std::string use;
 };
 
 struct PassRequest {
@@ -49,13 +63,20 @@ class Integrator {
   virtual const char* description() const = 0;
   virtual bool unbiased() const { return true; }
   virtual bool splats() const { return false; }
+  // Whether noise can make pixels negative: where passes are reconstructed from differences.
+  virtual bool mayBeNegative() const { return false; }
+  // Whether the passes of a bucket share a low-discrepancy sequence, for Accumulator::variance().
+  virtual bool lowDiscrepancy(const Settings& settings) const { return settings.sampler == SamplerKind::Sobol; }
   // Whether pixels share their random numbers.
   virtual Correlation correlation() const { return Correlation::Independent; }
   // Whether it estimates the bias of its passes (PassTarget::bias).
   virtual bool estimatesBias() const { return false; }
   // A pure function of the plan and the scene; null when passes need nothing.
   virtual std::shared_ptr<const Preparation> prepare(const TransportContext&, const Plan&) const { return nullptr; }
-  virtual Applies applies(const SceneTraits& traits) const = 0;
+  // `reach` says how light gets to what the camera sees (measured only when integrators are chosen automatically).
+  virtual Applies applies(const SceneTraits& traits, const LightReach& reach) const = 0;
+  // Of one pass with this plan's window and settings.
+  virtual WorkingMemory workingMemory(const Plan&) const { return {}; }
   // Renders pass `request.pass` of the plan's window into the target. Returns false when cancelled.
   virtual bool renderPass(const PassRequest& request, PassTarget& target) const = 0;
 
@@ -66,6 +87,7 @@ class Integrator {
     return sampler.itemKey(static_cast<uint64_t>(y) * static_cast<uint64_t>(plan.settings.width) +
                            static_cast<uint64_t>(x));
   }
+  virtual Roulette roulette() const { return {}; }
 };
 
 }  // namespace braid

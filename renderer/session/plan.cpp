@@ -14,8 +14,12 @@ namespace braid {
 
 namespace {
 
-void planIntegrators(const SceneTraits& traits, const Settings& settings,
-                     const std::vector<const Integrator*>& available, Plan& plan) {
+void planIntegrators(const Scene& scene, const Settings& settings, const std::vector<const Integrator*>& available,
+                     Plan& plan) {
+  LightReach reach;
+  if (std::find(settings.integrators.begin(), settings.integrators.end(), "auto") != settings.integrators.end())
+    reach = measureLightReach(TransportContext(scene, settings.lightStrategy), plan.camera, settings.width,
+                              settings.height);
   std::string known;
   for (const Integrator* i : available) known += fmt::format("{}{}", known.empty() ? "" : ", ", i->name());
   for (const std::string& name : settings.integrators) {
@@ -23,7 +27,7 @@ void planIntegrators(const SceneTraits& traits, const Settings& settings,
     for (const Integrator* i : available) {
       if (name != "auto" && name != i->name()) continue;
       found = true;
-      const Applies applies = i->applies(traits);
+      const Applies applies = i->applies(scene.traits(), reach);
       // An integrator asked for by name runs even where the scene does not need it.
       const bool kept = applies.yes || name != "auto" || settings.full;
       plan.lines.push_back({kept, i->name(), applies.reason});
@@ -31,6 +35,19 @@ void planIntegrators(const SceneTraits& traits, const Settings& settings,
     }
     if (!found) throw Error(ExitCode::Usage, "unknown integrator '" + name + "': known are auto, " + known);
   }
+  if (plan.integrators.size() < 2) return;
+  // The first one is the headline when nothing combines them. Photons are kept where unbiased images are led by
+  // fireflies.
+  const bool chosen = settings.integrators == std::vector<std::string>{"auto"};
+  if (chosen)
+    std::stable_partition(plan.integrators.begin(), plan.integrators.end(),
+                          [](const PlannedIntegrator& p) { return !p.integrator->unbiased(); });
+  plan.lines.push_back(
+      {true, "headline", fmt::format("{}, unless a combiner makes it", plan.integrators[0].integrator->name())});
+  std::string shares;
+  for (const PlannedIntegrator& p : plan.integrators)
+    shares += fmt::format("{}{} {}", shares.empty() ? "" : ", ", p.integrator->name(), p.passesPerRound);
+  plan.lines.push_back({true, "passes of a round", shares});
 }
 
 // The scene's parts that cost something, kept or left out.
@@ -79,15 +96,33 @@ void planFilm(const Settings& settings, Plan& plan) {
   plan.filmBytesPerPixel = accumulator * plan.integrators.size() + 12;
   if (plan.features) plan.filmBytesPerPixel += FeatureSample::kComponents * (3 * 8 + 4);
   if (settings.transparent) plan.filmBytesPerPixel += 12;
-  plan.lines.push_back({plan.buckets == 4, "quarter buckets",
-                        plan.buckets == 4 ? "asked for" : "no output or combiner reads quarters: two half buffers"});
+  bool bias = false;
+  for (const PlannedIntegrator& p : plan.integrators) {
+    if (!p.integrator->estimatesBias()) continue;
+    plan.filmBytesPerPixel += 48 + (bias ? 0 : 12);
+    bias = true;
+  }
   plan.lines.push_back(
-      {plan.features, "features",
-       plan.features ? "albedo, normal, depth, visibility for outputs" : "no output or combiner reads them"});
+      {plan.buckets == 4, "quarter buckets",
+       plan.buckets == 4 ? "for outputs or combiners" : "no output or combiner reads quarters: two half buffers"});
+  plan.lines.push_back({plan.features, "features",
+                        plan.features ? "albedo, normal, depth, visibility for outputs or combiners"
+                                      : "no output or combiner reads them"});
+  plan.lines.push_back({settings.history, "history",
+                        settings.history ? fmt::format("variances after rounds 1, 2, 4, ...: {} bytes a pixel each",
+                                                       12 * plan.integrators.size())
+                                         : "no combiner looks at convergence"});
   plan.lines.push_back({true, "film",
                         fmt::format("{} bytes a pixel, {:.1f} MiB", plan.filmBytesPerPixel,
                                     static_cast<double>(plan.filmBytesPerPixel) * plan.window.width() *
                                         plan.window.height() / 1048576.0)});
+  for (const PlannedIntegrator& p : plan.integrators) {
+    const WorkingMemory memory = p.integrator->workingMemory(plan);
+    if (memory.bytes == 0) continue;
+    plan.lines.push_back(
+        {true, std::string(p.integrator->name()) + " memory",
+         fmt::format("at most {:.1f} MiB {}", static_cast<double>(memory.bytes) / 1048576.0, memory.use)});
+  }
 }
 
 }  // namespace
@@ -102,7 +137,7 @@ Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& sett
   if (w.x0 < 0 || w.y0 < 0 || w.x1 > settings.width || w.y1 > settings.height || w.width() <= 0 || w.height() <= 0)
     throw Error(ExitCode::Usage, fmt::format("the crop {},{},{},{} is empty or outside the {}x{} frame", w.x0, w.y0,
                                              w.x1, w.y1, settings.width, settings.height));
-  planIntegrators(scene.traits(), settings, available, plan);
+  planIntegrators(scene, settings, available, plan);
   planSceneParts(scene, settings, plan);
   planFilm(settings, plan);
   return plan;
@@ -121,6 +156,8 @@ uint64_t Plan::hash() const {
   h.add(fmt::format("{} {} {} {} {} {} {} {}", settings.width, settings.height, settings.maxDepth, settings.seed,
                     static_cast<int>(settings.sampler), toString(settings.filter), settings.clamp,
                     settings.transparent));
+  h.add(fmt::format("{} {} {} {}", settings.photons, settings.photonRadius, settings.photonDirect,
+                    settings.photonAiming));
   return h.value();
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/session/session.h"
 
+#include <bit>
 #include <chrono>
 
 #include <tbb/task_arena.h>
@@ -50,7 +51,8 @@ Session::Session(const Scene& scene, Plan plan)
     : scene_(scene), plan_(std::move(plan)), context_(scene, plan_.settings.lightStrategy) {
   if (plan_.integrators.empty()) throw Error(ExitCode::Usage, "no integrator to run: name one with --integrator");
   for (size_t i = 0; i < plan_.integrators.size(); ++i)
-    accumulators_.emplace_back(plan_.window.width(), plan_.window.height(), plan_.buckets);
+    accumulators_.emplace_back(plan_.window.width(), plan_.window.height(), plan_.buckets,
+                               plan_.integrators[i].integrator->estimatesBias());
   seconds_.assign(plan_.integrators.size(), 0.0);
   if (plan_.features) features_ = std::make_unique<FeatureAccumulator>(plan_.window.width(), plan_.window.height());
   if (plan_.settings.transparent)
@@ -64,9 +66,13 @@ RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bo
   RenderResult result;
   tbb::task_arena arena(settings.threads > 0 ? settings.threads : tbb::task_arena::automatic);
   arena.execute([&] {
-    bool splats = false;
-    for (const PlannedIntegrator& p : plan_.integrators) splats = splats || p.integrator->splats();
-    PassTarget target(plan_.window.width(), plan_.window.height(), splats, plan_.features, plan_.settings.transparent);
+    bool splats = false, bias = false;
+    for (const PlannedIntegrator& p : plan_.integrators) {
+      splats = splats || p.integrator->splats();
+      bias = bias || p.integrator->estimatesBias();
+    }
+    PassTarget target(plan_.window.width(), plan_.window.height(), splats, plan_.features, plan_.settings.transparent,
+                      bias);
     const Clock clock;
     std::vector<std::shared_ptr<const Preparation>> preparations;
     for (size_t i = 0; i < plan_.integrators.size(); ++i) {
@@ -102,6 +108,7 @@ RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bo
         seconds_[i] += passClock.seconds();
       }
       if (!abandoned) ++result.rounds;
+      if (settings.history && !abandoned && std::has_single_bit(result.rounds)) keepCheckpoints();
       Progress p;
       p.round = result.rounds;
       p.rounds = settings.spp;
@@ -153,11 +160,24 @@ std::shared_ptr<const Estimates> Session::snapshot() const {
     for (int h = 0; h < 2; ++h) estimate.half[h] = a.halfMean(h);
     if (plan_.settings.quarters)
       for (int k = 0; k < 4; ++k) estimate.quarter.push_back(a.bucketMean(k));
-    estimate.variance = a.variance(plan_.settings.sampler == SamplerKind::Sobol);
+    estimate.variance = a.variance(plan_.integrators[i].integrator->lowDiscrepancy(plan_.settings));
+    if (a.keepsBias()) {
+      estimate.bias = a.biasMean();
+      estimate.biasVariance = a.biasVariance();
+    }
     e->estimates.push_back(std::move(estimate));
   }
   if (features_) e->features = collectFeatures(*features_);
+  e->history = history_;
   return e;
+}
+
+void Session::keepCheckpoints() {
+  for (size_t i = 0; i < plan_.integrators.size(); ++i) {
+    const Accumulator& a = accumulators_[i];
+    history_[plan_.integrators[i].integrator->name()].push_back(
+        {a.passes(), seconds_[i], a.variance(plan_.integrators[i].integrator->lowDiscrepancy(plan_.settings))});
+  }
 }
 
 }  // namespace braid

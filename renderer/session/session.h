@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -66,12 +67,15 @@ class Session {
   std::shared_ptr<const Estimates> snapshot() const;
 
  private:
+  // Adds the present state of all estimates to the history.
+  void keepCheckpoints();
 
   const Scene& scene_;
   Plan plan_;
   TransportContext context_;
   std::vector<Accumulator> accumulators_;
   std::vector<double> seconds_;
+  std::map<std::string, std::vector<Checkpoint>> history_;
   std::unique_ptr<FeatureAccumulator> features_;
   std::unique_ptr<CoverageAccumulator> coverage_;  // with a transparent background
 };

@@ -28,9 +28,14 @@ struct Settings {
   LightStrategy lightStrategy = LightStrategy::Automatic;
   bool features = true;  // albedo, normal, depth, visibility
   bool quarters = false;
+  bool history = false;                // variances after rounds 1, 2, 4, …
   bool transparent = false;            // camera rays that miss: no radiance, alpha 0
   std::optional<Spectrum> background;  // what camera rays that miss see instead of the environment
   float clamp = 0;                     // largest channel of one path's radiance; 0: off (unbiased)
+  uint64_t photons = 0;                // light paths of a photon mapping pass; 0: one per pixel of the window
+  float photonRadius = 5;              // of the first passes, in pixels as seen from the camera
+  bool photonDirect = false;           // direct light by photons too, not by next-event estimation
+  bool photonAiming = true;            // choose lights also by whether their photons arrive where the camera looks
   bool full = false;                   // leave nothing out
   int threads = 0;                     // 0: all that the process may use
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Set-up of the lobes, the choice among them, and the public operations. The lobes: lobes_specular.cpp,
-// lobes_layers.cpp.
+// lobes_layers.cpp; groups of them: lobe_groups.cpp.
 #include "renderer/transport/bsdf.h"
 
 #include <algorithm>
@@ -54,6 +54,8 @@ void Bsdf::initLayers(const SurfaceParameters& p, Transport transport) {
 
   // What remains may be a plain diffuse surface, for instance with specular 0.
   diffuseOnly_ = lobes_ == kLobeDiffuse;
+  scatter_ = lobes_;
+  group_ = LobeGroup::All;
   if (!diffuseOnly_) initDirection();
 }
 
@@ -188,7 +190,7 @@ Bsdf::Selection Bsdf::select() const {
   Selection s{};
   if (has(kLobeSpecular | kLobeTransmission) && microfacetOnly_) {
     s.specular = 1;
-    return s;
+    return group_ == LobeGroup::All ? s : restrictedTo(group_, s);
   }
   const LobeAlbedos a = lobeAlbedos(false);
   s.diffuse = average(a.diffuse);
@@ -209,7 +211,7 @@ Bsdf::Selection Bsdf::select() const {
   constexpr float kFloor = 0.05f;
   const float scale = 1 / (total * (1 + kFloor * count));
   for (float* w : all) *w = *w > 0 ? (*w + kFloor * total) * scale : 0.0f;
-  return s;
+  return group_ == LobeGroup::All ? s : restrictedTo(group_, s);
 }
 
 Spectrum Bsdf::layersAlbedo() const {
@@ -222,19 +224,19 @@ BsdfValue Bsdf::evaluateLayers(const Vec3& wi, bool reverse) const {
   BsdfValue v;
   if (!nonDelta_ || wi.z == 0) return v;
   if (wi.z > 0) {
-    if (has(kLobeDiffuse)) {
+    if (scatters(kLobeDiffuse)) {
       const float cosine = wi.z * kInvPi;
       v.f = diffuse_ * (cosine * diffuseBelowSpecular(wi));
       v.pdfW = select_.diffuse * cosine;
     }
-    if (has(kLobeSpecular | kLobeTransmission) && !smooth_) addReflection(wi, v);
+    if (scatters(kLobeSpecular | kLobeTransmission) && !smooth_) addReflection(wi, v);
   } else {
-    if (has(kLobeDiffuseTransmission)) {
+    if (scatters(kLobeDiffuseTransmission)) {
       const float cosine = -wi.z * kInvPi;
       v.f = diffuseTransmission_ * (cosine * diffuseBelowSpecular(wi));
       v.pdfW = select_.diffuseTransmission * cosine;
     }
-    if (has(kLobeTransmission) && !smooth_ && !passThrough_) addTransmission(wi, v);
+    if (scatters(kLobeTransmission) && !smooth_ && !passThrough_) addTransmission(wi, v);
   }
   if (has(kLobeSheen | kLobeClearcoat)) addLayers(wi, v);
   if (reverse) {

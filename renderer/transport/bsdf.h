@@ -45,6 +45,11 @@ struct BsdfSample {
 // Radiance changes by 1/eta² when it crosses into a denser medium, power does not (Veach 1997, section 5.2).
 enum class Transport : uint8_t { Radiance, Power };
 
+// Lobes by what a photon map can do for them. Broad: diffuse, diffuse transmission, sheen, and GGX lobes with alpha of
+// at least kBroadAlpha: few photons do. Narrow: the rest, where next to no photon would come from the lobe.
+enum class LobeGroup : uint8_t { All, Broad, Narrow };
+inline constexpr float kBroadAlpha = 0.3f;
+
 class Bsdf {
  public:
   // wo may lie on or below the horizon of the shading normal (interpolated normals): it is mirrored and lifted to it.
@@ -82,6 +87,11 @@ class Bsdf {
   // Directional reflectance for wo, each channel in [0, 1]: a feature for denoisers, smooth rather than exact.
   Spectrum albedo() const { return diffuseOnly_ ? diffuse_ : layersAlbedo(); }
   bool diffuseOnly() const { return diffuseOnly_; }
+  // Probability that sample() picks a broad lobe: 1 for diffuse surfaces, 0 also for black ones.
+  float broadShare() const { return diffuseOnly_ ? 1.0f : layersBroadShare(); }
+  // The lobes of one group alone, as the layers above leave them: values add up to those of all lobes, probabilities of
+  // selection are renormalised. albedo() stays that of all lobes.
+  Bsdf restricted(LobeGroup group) const;
   // The factor 1/eta² in f and weight of specular transmission under Transport::Radiance; 1 when there is none.
   float radianceScale() const { return diffuseOnly_ ? 1.0f : radianceScale_; }
 
@@ -116,6 +126,12 @@ class Bsdf {
   Bsdf reversed(const Vec3& wi) const;
   LobeAlbedos lobeAlbedos(bool smooth) const;
   Selection select() const;
+
+  // lobe_groups.cpp
+  uint32_t broadLobes() const;
+  float layersBroadShare() const;
+  Selection restrictedTo(LobeGroup group, Selection s) const;
+
   Spectrum layersAlbedo() const;
   BsdfValue evaluateLayers(const Vec3& wi, bool reverse) const;
   bool sampleLayers(float uLobe, const Vec2& u, BsdfSample& out) const;
@@ -155,6 +171,7 @@ class Bsdf {
   bool sampleClearcoat(const Vec2& u, BsdfSample& out) const;
 
   bool has(uint32_t lobe) const { return (lobes_ & lobe) != 0; }
+  bool scatters(uint32_t lobe) const { return (scatter_ & lobe) != 0; }
 
   Vec3 wo_;
   Spectrum diffuse_;  // colour of the diffuse reflection with its share of the mix
@@ -170,7 +187,9 @@ class Bsdf {
   bool weighsDiffuse_;             // diffuse lobes lie below a specular layer
   bool coatedHere_, coatedThere_;  // clearcoat and sheen on the side of wo, on the other side
   bool entering_;
-  uint32_t lobes_;  // the lobes that are not black, and modifiers
+  LobeGroup group_;   // of the lobes that scatter
+  uint32_t lobes_;    // the lobes that are not black, and modifiers
+  uint32_t scatter_;  // those of the group; the others only take light away from what lies below them
 
   Spectrum diffuseTransmission_, transmission_;  // colours with their share of the mix
 

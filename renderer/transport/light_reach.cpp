@@ -73,13 +73,36 @@ WalkSettings probeWalk(Transport transport) {
   return settings;
 }
 
+// Whether one light sample at the vertex finds light, hidden by nothing.
+bool seesLight(const TransportContext& context, const SubpathVertex& vertex, const SampleBlock& block) {
+  LightSample light;
+  if (!context.lights.sample(vertex.hit.position, vertex.receiverNormal(), vertex.twoSided, block.u[slot::kLightSelect],
+                             {block.u[slot::kLightU], block.u[slot::kLightV]}, light) ||
+      isBlack(evaluateVertex(context, vertex, Transport::Radiance, light.wi).f))
+    return false;
+  const Vec3 origin = offsetOrigin(vertex.hit, light.wi);
+  ShadowBatch ray;
+  bool hidden = true;
+  if (light.distance < kInfinity)
+    ray.set(0, {origin, vertex.hit.position + light.wi * light.distance - origin, 1 - 1e-4f, 0});
+  else
+    ray.set(0, {origin, light.wi, kInfinity, 0});
+  context.scene.accel().occluded(ray, 1, &hidden);
+  return !hidden;
+}
+
 VisibleCells findVisibleCells(const TransportContext& context, const PassSampler& sampler, const Camera& camera,
-                              int width, int height) {
+                              int width, int height, double& lit) {
   VisibleCells cells(camera.position(), 1e-6f * context.scene.traits().radius);
   SubpathBatch batch(context, sampler, probeWalk(Transport::Radiance));
+  double total = 0, found = 0;
   const auto onHit = [&](int, const SubpathState& state, const SubpathVertex& vertex) {
     if (!(state.leastPdfW > kFocusingPdf)) return false;
-    if (vertex.bsdf.hasNonDelta()) cells.add(vertex.hit.position, static_cast<double>(average(vertex.throughput)));
+    if (!vertex.bsdf.hasNonDelta()) return true;
+    const double weight = static_cast<double>(average(vertex.throughput));
+    cells.add(vertex.hit.position, weight);
+    total += weight;
+    if (seesLight(context, vertex, sampler.block(vertex.key, static_cast<unsigned>(vertex.segments)))) found += weight;
     return true;
   };
   for (int first = 0; first < kEyePaths; first += kBatch) {
@@ -94,6 +117,7 @@ VisibleCells findVisibleCells(const TransportContext& context, const PassSampler
     }
     batch.run(onHit, [](int, const SubpathState&) {});
   }
+  lit = total > 0 ? found / total : 0.0;
   return cells;
 }
 
@@ -105,7 +129,7 @@ LightReach measureLightReach(const TransportContext& context, const Camera& came
   const LightEmission emission(scene, context.lights);
   if (emission.empty()) return reach;
   const PassSampler sampler(SamplerKind::Independent, kSeed, 0, 0, 1);
-  const VisibleCells visible = findVisibleCells(context, sampler, camera, width, height);
+  const VisibleCells visible = findVisibleCells(context, sampler, camera, width, height, reach.lit);
   const std::map<uint32_t, double> areas = lampAreas(scene);
   double total = 0;
   const auto onHit = [&](int, const SubpathState& state, const SubpathVertex& vertex) {

@@ -19,6 +19,8 @@ struct LightReach {
   // Relative variance that caustics give to one camera path which can only find them by chance: Σ share / probability
   // of hitting the light over the focusing surface. 1 is as bad as a signal that one path in two sees.
   double causticVariance = 0;
+  // Share of the camera's view of rough surfaces from where one light sample finds a light unhidden.
+  double lit = 0;
 };
 
 // A pure function of the scene and the camera. Costs about as much as a pass of 128 x 128 pixels.

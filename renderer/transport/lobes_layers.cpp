@@ -114,11 +114,11 @@ void Bsdf::addLayers(const Vec3& wi, BsdfValue& v) const {
   const bool reflects = wi.z > 0 && coatedHere_;
   if (has(kLobeSheen)) {
     v.f *= belowSheen(wi);
-    if (reflects) addSheen(wi, v);
+    if (reflects && scatters(kLobeSheen)) addSheen(wi, v);
   }
   if (has(kLobeClearcoat)) {
     v.f *= belowClearcoat(wi);
-    if (reflects && !clearcoatSmooth_) addClearcoat(wi, v);
+    if (reflects && !clearcoatSmooth_ && scatters(kLobeClearcoat)) addClearcoat(wi, v);
   }
 }
 

@@ -236,8 +236,10 @@ bool SubpathBatch::scatter(SubpathState& state, const SubpathVertex& vertex) con
   state.lastPosition = hit.position;
   state.lastNormal = vertex.receiverNormal();
   state.lastTwoSided = vertex.twoSided;
+  state.lastPdfW = sample.pdfW;
   state.lightCouldNotBeSampled = sample.delta;
   state.deltaOnly = state.deltaOnly && sample.delta;
+  if (!sample.delta) state.leastPdfW = std::min(state.leastPdfW, sample.pdfW);
 
   if (state.segments >= settings_.rouletteStart) {
     const float relative = maxComponent(state.throughput) / (state.startThroughput * state.etaScale);

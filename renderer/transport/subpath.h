@@ -81,11 +81,13 @@ struct SubpathState {
   float etaScale = 1;
   bool byDistance = true;  // densities of the first hit depend on its distance: not for parallel rays
   bool deltaOnly = true;
+  float leastPdfW = kInfinity;  // of the directions sampled so far; delta ones do not count
   bool atStart = true;  // no surface met yet
 
   // The last vertex that scattered, for the weight of lights that the walk hits.
   Vec3 lastPosition{0}, lastNormal{0};
   bool lastTwoSided = false;
+  float lastPdfW = 0;  // of the direction sampled there
   bool lightCouldNotBeSampled = true;  // camera, delta scattering, or a null interface since
 
   uint32_t light = 0;  // where a light subpath started

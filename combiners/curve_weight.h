@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// How many samples a denoised pixel is worth, read off the curve by which the variance of the pixel fell (Denisova and
+// Bocchi 2024, "Converging Algorithm-Agnostic Denoising for Monte Carlo Rendering", Eqs. 7 and 14).
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+
+namespace braid {
+
+// The variance of a pixel mean at a number of passes.
+struct CurvePoint {
+  double passes = 0, variance = 0;
+};
+
+// log v = slope log I + intercept.
+struct ConvergenceCurve {
+  double slope = -1, intercept = 0;
+  // The number of passes at which the variance is `error`: W of Eq. (14).
+  double passesAt(double error) const;
+};
+
+// The least squares line through the newest points, from the last one backwards for as long as older variances are
+// larger and numbers of passes smaller, and both positive; at most `most` points. The slope is clamped to [-2, -1/4],
+// keeping the line on the centre of the points. Nothing with fewer than two points. `points` are oldest first, and
+// there are at most 8 that count.
+std::optional<ConvergenceCurve> fitCurve(std::span<const CurvePoint> points, size_t most);
+
+// The line of a given slope through one point. A slope of -1 is the law of Monte Carlo and gives W = I v / SURE; -2 is
+// what the second point of the paper comes to, V_{N-K} = V_K / (N/K - 1)² at N - K samples for any N and K, and gives
+// W = I sqrt(v / SURE).
+ConvergenceCurve curveOfSlope(const CurvePoint& point, double slope);
+
+struct WeightLimits {
+  double most = 65536;    // of W, in passes: beyond it the denoised image fades
+  double mostRatio = 64;  // of W to the passes of the noisy image
+};
+
+// W of one pixel and channel, in passes, between 0 and the limits, finite: the curve at `error`. `now` is the newest
+// point, its variance filtered like the error; `epsilon` is added to both, against 0/0. A pixel where both images are
+// black has any weight, here 0; one that is black in the noisy image only, and without variance, has 0 as well.
+double denoisedWeight(std::span<const CurvePoint> history, const CurvePoint& now, double error, double epsilon,
+                      double fallbackSlope, size_t points, const WeightLimits& limits);
+
+}  // namespace braid

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+// Blending by convergence curves (Denisova and Bocchi 2024, "Converging Algorithm-Agnostic Denoising for Monte Carlo
+// Rendering"): every pixel and channel is
+//   out = (I n + W d) / (I + W),
+// where I is the number of passes of the noisy image n, and W the number of passes at which the noisy image will be as
+// good as the denoised image d. The error of d is Stein's unbiased risk estimate, for which the denoiser runs twice
+// more; W comes from the line through the logarithms of earlier variances (combiners/curve_weight.h). The denoised
+// image fades as the render converges.
+//
+// Earlier variances are filtered with the width of the newest, so that the curve of a pixel describes one region.
+#include <algorithm>
+#include <cmath>
+
+#include "combiners/curve_weight.h"
+#include "combiners/denoise/variance.h"
+#include "combiners/finite_float.h"
+#include "combiners/registry.h"
+#include "combiners/sure_map.h"
+#include "renderer/core/error.h"
+#include "renderer/core/parallel.h"
+
+namespace braid {
+
+namespace {
+
+const OptionInfo kStep{"curves-step", 0.1, "Perturbation of the risk estimate in standard deviations of a pixel"};
+const OptionInfo kSlope{"curves-fallback-slope", -2, "Slope of pixels without a curve; -2: the paper, -1: theory"};
+const OptionInfo kPoints{"curves-points", 4, "Most points of a curve, 2 to 8; fewer: all pixels take the fallback"};
+const OptionInfo kMost{"curves-most", 65536, "Most passes that a denoised pixel counts"};
+const OptionInfo kMostRatio{"curves-most-ratio", 64, "Most passes that it counts, per pass of the noisy image"};
+
+// Before, variances are too uncertain for a curve.
+constexpr double kFewestPasses = 16;
+constexpr double kRelativeEpsilon = 1e-6;
+
+class Curves : public Method {
+ public:
+  const char* name() const override { return "curves"; }
+  const char* description() const override { return "Denoised image that fades as the noisy one converges (SURE)"; }
+  MethodKind kind() const override { return MethodKind::Combiner; }
+  Needs needs() const override {
+    Needs needs;
+    needs.biased = needs.redenoise = true;
+    needs.checkpoints = 2;
+    needs.halves = false;
+    return needs;
+  }
+  std::vector<OptionInfo> options() const override { return {kStep, kSlope, kPoints, kMost, kMostRatio}; }
+  MethodResult run(const MethodInputs& in) const override;
+};
+
+// The filtered maps of a blend.
+struct Maps {
+  double passes = 0, sigma = 0;
+  Rgb<float> variance, error, difference;  // v, SURE without negative values, (d - n)²
+  std::vector<double> historyPasses;       // earlier than `passes`, oldest first
+  std::vector<Rgb<float>> history;
+};
+
+Rgb<float> squaredDifference(const Rgb<float>& a, const Rgb<float>& b) {
+  Rgb<float> out(a.width(), a.height());
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t i = 0; i < out.size(); ++i)
+      out[c][i] = finiteFloat(sqr(static_cast<double>(a[c][i]) - static_cast<double>(b[c][i])));
+  return out;
+}
+
+Maps mapsOf(const MethodInputs& in, size_t points) {
+  const Estimate &n = *in.unbiased, &d = *in.biased;
+  const double step = std::clamp(in.options.number(kStep), 1e-3, 10.0);
+  const Rgb<float> sure = sureMap(n.mean, d.mean, n.variance, in.seed, step, in.redenoise);
+  Maps maps;
+  maps.passes = static_cast<double>(passesOf(n));
+  maps.sigma = mapFilterSigma(n.variance);
+  maps.variance = gaussianFiltered(n.variance, maps.sigma);
+  maps.error = gaussianFiltered(sure, maps.sigma);
+  applySignRule(maps.error, sure, n.variance);
+  maps.difference = gaussianFiltered(squaredDifference(n.mean, d.mean), maps.sigma);
+  if (!in.history || points < 2 || maps.passes < kFewestPasses) return maps;
+  // The last points - 1 states between one pass, which has no variance, and now.
+  std::vector<const Checkpoint*> kept;
+  for (const Checkpoint& k : *in.history)
+    if (k.passes >= 2 && static_cast<double>(k.passes) < maps.passes && k.variance.size() == n.mean.size())
+      kept.push_back(&k);
+  for (size_t k = kept.size() - std::min(kept.size(), points - 1); k < kept.size(); ++k) {
+    maps.historyPasses.push_back(static_cast<double>(kept[k]->passes));
+    maps.history.push_back(gaussianFiltered(kept[k]->variance, maps.sigma));
+  }
+  return maps;
+}
+
+// 10⁻⁶ of the mean variance of a channel.
+double epsilonOf(const Plane<float>& variance) {
+  const double sum = parallelSum<double>(variance.size(), 4096, 0, [&](size_t begin, size_t end) {
+    double part = 0;
+    for (size_t i = begin; i < end; ++i) part += static_cast<double>(variance[i]);
+    return part;
+  });
+  return variance.empty() ? 0 : kRelativeEpsilon * sum / static_cast<double>(variance.size());
+}
+
+// W of all pixels of a channel.
+Plane<float> weightsOf(const Maps& maps, size_t c, const MethodOptions& options, size_t points) {
+  const double slope = std::clamp(options.number(kSlope), -2.0, -0.25), epsilon = epsilonOf(maps.variance[c]);
+  const WeightLimits limits{std::max(0.0, options.number(kMost)), std::max(0.0, options.number(kMostRatio))};
+  Plane<float> out(maps.variance.width(), maps.variance.height());
+  parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+    std::vector<CurvePoint> curve(maps.history.size() + 1);
+    for (size_t i = begin; i < end; ++i) {
+      for (size_t k = 0; k < maps.history.size(); ++k)
+        curve[k] = {maps.historyPasses[k], static_cast<double>(maps.history[k][c][i])};
+      const CurvePoint now{maps.passes, static_cast<double>(maps.variance[c][i])};
+      curve.back() = now;
+      out[i] = finiteFloat(
+          denoisedWeight(curve, now, static_cast<double>(maps.error[c][i]), epsilon, slope, points, limits));
+    }
+  });
+  return out;
+}
+
+// The squared error of n + a (d - n): (1 - a)² v + a² m + 2 a (1 - a) q, where q, the covariance of both errors, is
+// what is left of (d - n)² = v + m - 2 q. No larger than correlated errors can be.
+double blendError(double v, double m, double difference, double a) {
+  const double bound = std::sqrt(v * m), q = std::clamp(0.5 * (v + m - difference), -bound, bound);
+  return std::max(0.0, (1 - a) * (1 - a) * v + a * a * m + 2 * a * (1 - a) * q);
+}
+
+// The halves take the weights of the whole image, where both inputs have halves.
+MethodResult Curves::run(const MethodInputs& in) const {
+  const Estimate &n = *in.unbiased, &d = *in.biased;
+  if (!in.redenoise) throw Error(ExitCode::Usage, "needs a denoiser that it can run again as its biased input");
+  const auto points = static_cast<size_t>(std::clamp(in.options.number(kPoints), 0.0, 8.0));
+  const Maps maps = mapsOf(in, points);
+  const int width = n.mean.width(), height = n.mean.height();
+  MethodResult result;
+  result.image.mean = Rgb<float>(width, height);
+  const bool halves = !n.half[0].empty() && !n.half[1].empty() && !d.half[0].empty() && !d.half[1].empty();
+  if (halves) result.image.half[0] = result.image.half[1] = Rgb<float>(width, height);
+  result.error = Plane<float>(width, height);
+  Plane<float> share(width, height);
+  for (size_t c = 0; c < 3; ++c) {
+    const Plane<float> weight = weightsOf(maps, c, in.options, points);
+    parallelChunks(weight.size(), 4096, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        const double w = static_cast<double>(weight[i]), a = w / (maps.passes + w);
+        const auto blend = [a](float x, float y) {
+          return finiteFloat((1 - a) * static_cast<double>(x) + a * static_cast<double>(y));
+        };
+        result.image.mean[c][i] = blend(n.mean[c][i], d.mean[c][i]);
+        for (int h = 0; halves && h < 2; ++h) result.image.half[h][c][i] = blend(n.half[h][c][i], d.half[h][c][i]);
+        result.error[i] +=
+            finiteFloat(blendError(static_cast<double>(maps.variance[c][i]), static_cast<double>(maps.error[c][i]),
+                                   static_cast<double>(maps.difference[c][i]), a) /
+                        3);
+        share[i] += static_cast<float>(a / 3);
+      }
+    });
+  }
+  result.aovs.push_back({"weight.curves", std::move(share)});
+  Attribute sigma, used;
+  sigma.name = "mapFilterSigma";
+  sigma.kind = Attribute::Kind::Float;
+  sigma.number = maps.sigma;
+  used.name = "curvePoints";
+  used.kind = Attribute::Kind::Int;
+  used.integer = static_cast<int64_t>(maps.history.size() + 1);
+  result.remarks = {sigma, used};
+  return result;
+}
+
+}  // namespace
+
+std::unique_ptr<Method> make_curves() { return std::make_unique<Curves>(); }
+
+}  // namespace braid

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Non-local means with variance-aware distances (Rousselle et al. 2012, "Adaptive Rendering with Non-Local Means
+// Filtering"), in gather form: a building block of the denoisers.
+//
+// The distance of a pixel pair p, q in one channel of a guide image u with variance v is
+//   d² = ((u_p - u_q)² - (v_p + min(v_p, v_q))) / (k² (s_p + s_q) + eps),   at most 10⁴,
+// with s = v unless the guide says otherwise. It is averaged over the channels of the guide and over a patch of
+// (2F + 1)² pixel pairs at the same offset, clipped at the borders; the weight is exp(-max(0, distance)). With several
+// guides the largest distance counts, that is the smallest weight: three guides of one channel each give the minimum
+// over red, green and blue. The weight of a pixel with itself is 1.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "combiners/denoise/window.h"
+#include "renderer/core/plane.h"
+
+namespace braid {
+
+// Planes that weights are computed from, and how. All planes are finite, of one size, and outlive the filter.
+struct NlmGuide {
+  std::vector<const Plane<float>*> mean, variance;  // one of each per channel; variances of the mean, >= 0
+  std::vector<const Plane<float>*> spread;          // s of the denominator; empty: the variances
+  float k = 0.45f;                                  // sensitivity: larger filters more
+  int patch = 3;                                    // F >= 0
+  float varianceScale = 1;                          // factor on variance and spread, e.g. 2 for half buffers
+  float epsilon = 1e-7f;
+};
+
+// Guides from one or three planes of an image and its variance, which must outlive them.
+NlmGuide nlmGuide(const Plane<float>& mean, const Plane<float>& variance, float k, int patch);
+NlmGuide nlmGuide(const Rgb<float>& mean, const Rgb<float>& variance, float k, int patch);
+
+// The weights of one tile, offset by offset: for regressions and whatever else needs more than weighted means. One
+// object per tile and thread.
+class NlmWeights {
+ public:
+  // `tile` lies in the image. There is at least one guide, with at least one channel.
+  NlmWeights(std::span<const NlmGuide> guides, const PixelRect& tile);
+
+  // The weights of (p, p + (dx, dy)) for the pixels p of the tile, row by row, tile.width() apart; 0 where p + (dx, dy)
+  // lies outside the image. Valid until the next call.
+  const float* at(int dx, int dy);
+
+ private:
+  void addGuide(const NlmGuide& guide, int dx, int dy, const PixelRect& inside, bool first);
+
+  std::span<const NlmGuide> guides_;
+  PixelRect tile_;
+  int width_, height_;  // of the image
+  std::vector<float> weights_, difference_, rowSums_, inverseCounts_, patchSums_;
+};
+
+// Replaces each pixel of each target by its weighted mean over the window of (2 window + 1)² pixels, clipped at the
+// borders: out[i] = filtered in[i]. Every out[i] has the size of the image and differs from every in[j] and every
+// guide plane.
+void nlmFilter(std::span<const NlmGuide> guides, int window, std::span<const Plane<float>* const> in,
+               std::span<Plane<float>* const> out);
+
+// The same for three planes with one guide.
+Rgb<float> nlmFilter(const NlmGuide& guide, int window, const Rgb<float>& in);
+
+}  // namespace braid

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// The first-order patch-Welch filter (pw1_filter.h): for 64 samples and more; below that its slopes fit noise.
+#include <algorithm>
+#include <array>
+
+#include "combiners/denoise/pw1_filter.h"
+#include "combiners/denoise/pw_method.h"
+#include "combiners/registry.h"
+
+namespace braid {
+
+namespace {
+
+const OptionInfo kThreshold{"pw1-threshold", kPatchWelchWideThreshold,
+                            "Normal deviates up to which a difference of means counts as noise"};
+const OptionInfo kStride{"pw1-stride", FirstOrderOptions().stride, "Pixels between the centres of the fits"};
+
+class PatchWelchFirstOrder : public Method {
+ public:
+  const char* name() const override { return "pw1"; }
+  const char* description() const override {
+    return "First-order regression with patch-Welch weights, from 64 samples";
+  }
+  MethodKind kind() const override { return MethodKind::Denoiser; }
+  Needs needs() const override { return patchWelchNeeds(); }
+  std::vector<OptionInfo> options() const override { return {kThreshold, kStride}; }
+
+  MethodResult run(const MethodInputs& in) const override {
+    const PatchWelchInput input = patchWelchInputOf(in, name());
+    FirstOrderOptions options;
+    options.threshold = thresholdOf(in, kThreshold);
+    options.stride = static_cast<int>(std::clamp(in.options.number(kStride), 1.0, 1.0 * kPatchWelchWindow));
+    const auto zeroOrder = patchWelch(input, std::array{options.threshold}, {}, in.cancel);
+    MethodResult result = patchWelchResult(patchWelchFirstOrder(input, zeroOrder[0], options, in.cancel));
+    result.remarks = {numberAttribute(kThreshold.name, options.threshold),
+                      numberAttribute(kStride.name, options.stride)};
+    return result;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Method> make_pw1() { return std::make_unique<PatchWelchFirstOrder>(); }
+
+}  // namespace braid

@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combiners/denoise/pw1_filter.h"
+
+#include <cmath>
+#include <cstring>
+#include <memory>
+
+#include "combiners/normal_equations.h"
+#include "renderer/core/error.h"
+
+namespace braid {
+
+namespace {
+
+constexpr int kRadius = kPatchWelchWindow, kSide = 2 * kRadius + 1;
+// The window and one pixel around it are copied to contiguous memory, row by row: pixels at one offset from each other
+// are then at one distance, and loops run over the whole window at once. The last two columns of a "row" of kPitch
+// belong to the border and have weight zero.
+constexpr int kPitch = kSide + 2, kBorderedSize = kPitch * kPitch;
+constexpr int kUnit = 16, kLanes = 8;
+constexpr int kCount = (kSide * kPitch + kUnit - 1) / kUnit * kUnit;
+constexpr int kCapacity = (kCount + 2 * kPitch + 2 + kUnit - 1) / kUnit * kUnit;
+constexpr int kToWindow = kPitch + 1;  // from the first bordered pixel to the first one of the window
+constexpr int kCentre = kRadius * kPitch + kRadius;
+static_assert(kCapacity >= kBorderedSize);
+
+constexpr int kColumns = 8;              // 1, dx, dy, normal, depth, visibility
+constexpr float kFeatureOffset = 0.05f;  // added to the largest difference that a feature column is divided by
+constexpr double kRidge = 1e-2;          // relative to the sum of the weights
+
+struct alignas(64) Bordered {
+  float v[kCapacity] = {};
+};
+struct alignas(64) Windowed {
+  float v[kCount] = {};
+};
+
+// Sums over the window are kept in eight lanes whatever the instruction set, for the same bits everywhere.
+using Lanes = float __attribute__((vector_size(kLanes * sizeof(float))));
+
+double sumOf(const Lanes& lanes) {
+  double sum = 0;
+  for (int l = 0; l < kLanes; ++l) sum += static_cast<double>(lanes[l]);
+  return sum;
+}
+
+// Row kRow of the normal equations: Σ w x_row x_k for k <= kRow, and Σ w x_row u_c.
+template <int kRow>
+void momentsOfRow(const std::array<Windowed, kColumns>& columns, const Windowed& weights,
+                  const std::array<const float*, 3>& u, NormalEquations& out) {
+  Lanes products[kRow + 1] = {}, rhs[3] = {};
+  for (int i = 0; i < kCount; i += kLanes) {
+    Lanes wx, x;
+    std::memcpy(&wx, weights.v + i, sizeof(wx));
+    std::memcpy(&x, columns[kRow].v + i, sizeof(x));
+    wx *= x;
+    for (int k = 0; k <= kRow; ++k) {
+      std::memcpy(&x, columns[static_cast<size_t>(k)].v + i, sizeof(x));
+      products[k] += wx * x;
+    }
+    for (size_t c = 0; c < 3; ++c) {
+      std::memcpy(&x, u[c] + i, sizeof(x));
+      rhs[c] += wx * x;
+    }
+  }
+  for (int k = 0; k <= kRow; ++k) out.matrix[kRow][static_cast<size_t>(k)] = sumOf(products[k]);
+  for (size_t c = 0; c < 3; ++c) out.rhs[kRow][c] = sumOf(rhs[c]);
+}
+
+void inverseVariances(const float* __restrict v, float centre, float* __restrict out) {
+  for (int i = 0; i < kCount; ++i) out[i] = 1.0f / ((centre + v[i]) + kPatchWelchEpsilon);
+}
+
+// sum += (u_centre - u)² inverse, over pixels inside the image.
+void addDifferences(const float* __restrict u, float centre, const float* __restrict inverse,
+                    const float* __restrict inside, float* __restrict sum) {
+  for (int i = 0; i < kCount; ++i) {
+    const float d = centre - u[i];
+    sum[i] += inside[i] > 0 ? d * d * inverse[i] : 0.0f;
+  }
+}
+
+void addCounts(const float* __restrict inside, float* __restrict count) {
+  for (int i = 0; i < kCount; ++i) count[i] += inside[i];
+}
+
+void addSquares(const float* __restrict guide, float centre, float* __restrict sum) {
+  for (int i = 0; i < kCount; ++i) sum[i] += (centre - guide[i]) * (centre - guide[i]);
+}
+
+// count <- 1 / count where there is any, edge <- mask 2^(spatial - edge)
+void finishCommon(const float* __restrict mask, const float* __restrict spatial, float* __restrict count,
+                  float* __restrict edge) {
+  for (int i = 0; i < kCount; ++i) {
+    count[i] = count[i] > 0 ? 1.0f / count[i] : 0.0f;
+    const float w = exp2NonPositive(spatial[i] - edge[i]);
+    edge[i] = mask[i] > 0 ? w : 0.0f;
+  }
+}
+
+void weightsOf(const float* __restrict sum, const float* __restrict inverseCount, const float* __restrict edge,
+               float scale, float* __restrict out) {
+  for (int i = 0; i < kCount; ++i) {
+    const float t = 1.0f - sum[i] * (inverseCount[i] * scale);
+    out[i] = t > 0 ? t * t * edge[i] : 0.0f;
+  }
+}
+
+// column <- (feature - centre) / (largest difference in the window + offset)
+void featureColumn(const float* __restrict feature, float centre, const float* __restrict mask,
+                   float* __restrict column) {
+  float largest[kUnit] = {};
+  for (int i = 0; i < kCount; i += kUnit)
+    for (int l = 0; l < kUnit; ++l) {
+      const float d = mask[i + l] > 0 ? feature[i + l] - centre : 0.0f;
+      column[i + l] = d;
+      largest[l] = std::max(largest[l], d < 0 ? -d : d);
+    }
+  const float scale = 1.0f / (*std::max_element(largest, largest + kUnit) + kFeatureOffset);
+  for (int i = 0; i < kCount; ++i) column[i] *= scale;
+}
+
+void addScaled(const float* __restrict column, float coefficient, float* __restrict sum) {
+  for (int i = 0; i < kCount; ++i) sum[i] += coefficient * column[i];
+}
+
+void addPrediction(const float* __restrict w, const float* __restrict p0, const float* __restrict p1,
+                   const float* __restrict p2, float* __restrict total, float* __restrict red, float* __restrict green,
+                   float* __restrict blue) {
+  for (int x = 0; x < kSide; ++x) {
+    total[x] += w[x];
+    red[x] += w[x] * p0[x];
+    green[x] += w[x] * p1[x];
+    blue[x] += w[x] * p2[x];
+  }
+}
+
+// All fits that reach into one tile. Their sums run in the order of the centres, row by row, in every tile.
+class TileRegression {
+ public:
+  TileRegression(const PatchWelchInput& input, const FirstOrderOptions& options, const PixelRect& tile)
+      : target_(tile),
+        image_{0, 0, input.width(), input.height()},
+        stride_(options.stride),
+        squaredThreshold_(squaredThreshold(options.threshold, input.passes)),
+        tile_(input, intersection(grown(tile, 2 * kRadius + 1), image_)),
+        sumPitch_(tile.width() + 4 * kRadius) {
+    const auto size = static_cast<size_t>(sumPitch_) * static_cast<size_t>(tile.height());
+    sums_.resize(input.images.size());
+    for (auto& image : sums_)
+      for (std::vector<float>& plane : image) plane.resize(size);
+    radiance_.resize(input.images.size());
+    for (int y = 0; y < kSide; ++y)
+      for (int x = 0; x < kSide; ++x) {
+        const int i = y * kPitch + x, dx = x - kRadius, dy = y - kRadius;
+        spatial_.v[i] = static_cast<float>(-static_cast<double>(kLog2E) * (dx * dx + dy * dy) /
+                                           (2 * kPatchWelchSpatialSd * kPatchWelchSpatialSd));
+        columns_[1].v[i] = static_cast<float>(dx) / kRadius;
+        columns_[2].v[i] = static_cast<float>(dy) / kRadius;
+        inWindow_.v[i] = 1;
+      }
+    std::fill_n(columns_[0].v, kCount, 1.0f);
+  }
+
+  void run() {
+    const PixelRect centres = intersection(grown(target_, kRadius), image_);
+    const auto firstMultiple = [this](int x) { return (x + stride_ - 1) / stride_ * stride_; };
+    for (int y = firstMultiple(centres.y0); y < centres.y1; y += stride_)
+      for (int x = firstMultiple(centres.x0); x < centres.x1; x += stride_) {
+        gather(x, y);
+        prepare(x, y);
+        for (size_t i = 0; i < radiance_.size(); ++i) {
+          fit(i);
+          scatter(x, y, sums_[i]);
+        }
+      }
+  }
+
+  // Blends with the zero-order results.
+  void write(const std::vector<Rgb<float>>& zeroOrder, float kappa, std::vector<Rgb<float>>& out) const {
+    for (size_t k = 0; k < out.size(); ++k)
+      for (size_t c = 0; c < 3; ++c)
+        for (int y = target_.y0; y < target_.y1; ++y)
+          for (int x = target_.x0; x < target_.x1; ++x) {
+            const auto at = static_cast<size_t>(sumIndex(x, y));
+            const float a = tile_.divisor[c][static_cast<size_t>(tile_.index(x, y))];
+            out[k][c].at(x, y) =
+                (a * sums_[k][1 + c][at] + kappa * zeroOrder[k][c].at(x, y)) / (sums_[k][0][at] + kappa);
+          }
+  }
+
+ private:
+  // Rows of sums have a margin, so that whole rows of a window can be added.
+  ptrdiff_t sumIndex(int x, int y) const {
+    return static_cast<ptrdiff_t>(y - target_.y0) * sumPitch_ + (x - target_.x0 + 2 * kRadius);
+  }
+
+  // Copies what the fit around (x, y) reads; zero outside the image.
+  void gather(int x, int y) {
+    const PixelRect window = grown({x, y, x + 1, y + 1}, kRadius + 1), pixels = intersection(window, image_);
+    const bool clipped = pixels.width() < kPitch || pixels.height() < kPitch;
+    const auto copy = [&](const std::vector<float>& from, Bordered& to) {
+      if (clipped) std::fill_n(to.v, kBorderedSize, 0.0f);
+      for (int row = pixels.y0; row < pixels.y1; ++row)
+        std::memcpy(to.v + (row - window.y0) * kPitch + (pixels.x0 - window.x0),
+                    from.data() + tile_.index(pixels.x0, row), static_cast<size_t>(pixels.width()) * sizeof(float));
+    };
+    for (size_t c = 0; c < 3; ++c) {
+      copy(tile_.variance[c], variance_[c]);
+      for (size_t i = 0; i < radiance_.size(); ++i) copy(tile_.radiance[i][c], radiance_[i][c]);
+    }
+    for (size_t g = 0; g < PatchWelchTile::kGuides; ++g) copy(tile_.guide[g], guide_[g]);
+    copy(tile_.depth, depth_);
+    copy(tile_.visibility, visibility_);
+    std::fill_n(inside_.v, kBorderedSize, 0.0f);
+    for (int row = pixels.y0; row < pixels.y1; ++row)
+      std::fill_n(inside_.v + (row - window.y0) * kPitch + (pixels.x0 - window.x0), pixels.width(), 1.0f);
+  }
+
+  // What all images share: edge terms, design columns, and the sums of squared differences over patches.
+  void prepare(int x, int y) {
+    for (int i = 0; i < kCount; ++i) mask_.v[i] = inWindow_.v[i] * inside_.v[i + kToWindow];
+    std::fill_n(edge_.v, kCount, 0.0f);
+    for (const Bordered& g : guide_) addSquares(g.v + kToWindow, g.v[kToWindow + kCentre], edge_.v);
+    sumPatches(x, y);
+    finishCommon(mask_.v, spatial_.v, inverseCount_.v, edge_.v);
+    const Bordered* features[] = {&guide_[3], &guide_[4], &guide_[5], &depth_, &visibility_};
+    for (size_t k = 0; k < 5; ++k)
+      featureColumn(features[k]->v + kToWindow, features[k]->v[kToWindow + kCentre], mask_.v, columns_[3 + k].v);
+  }
+
+  // For each image the sum over 3 x 3 pairs of (u_p - u_q)² / (V_p + V_q), summed over the channels.
+  void sumPatches(int x, int y) {
+    std::fill_n(inverseCount_.v, kCount, 0.0f);
+    for (size_t i = 0; i < radiance_.size(); ++i) std::fill_n(patches_[i].v, kCount, 0.0f);
+    for (int oy = -1; oy <= 1; ++oy)
+      for (int ox = -1; ox <= 1; ++ox) {
+        if (x + ox < 0 || x + ox >= image_.x1 || y + oy < 0 || y + oy >= image_.y1) continue;
+        const int shift = kToWindow + oy * kPitch + ox, centre = shift + kCentre;
+        addCounts(inside_.v + shift, inverseCount_.v);
+        for (size_t c = 0; c < 3; ++c) {
+          inverseVariances(variance_[c].v + shift, variance_[c].v[centre], inverse_.v);
+          for (size_t i = 0; i < radiance_.size(); ++i)
+            addDifferences(radiance_[i][c].v + shift, radiance_[i][c].v[centre], inverse_.v, inside_.v + shift,
+                           patches_[i].v);
+        }
+      }
+  }
+
+  // Weights, normal equations and predictions of one image.
+  void fit(size_t image) {
+    const float scale = 1.0f / (3 * squaredThreshold_ * PatchWelchInput::varianceFactor(image));
+    weightsOf(patches_[image].v, inverseCount_.v, edge_.v, scale, weights_.v);
+    const auto& radiance = radiance_[image];
+    const std::array<const float*, 3> u = {radiance[0].v + kToWindow, radiance[1].v + kToWindow,
+                                           radiance[2].v + kToWindow};
+    equations_.size = kColumns;
+    momentsOfRow<0>(columns_, weights_, u, equations_);
+    momentsOfRow<1>(columns_, weights_, u, equations_);
+    momentsOfRow<2>(columns_, weights_, u, equations_);
+    momentsOfRow<3>(columns_, weights_, u, equations_);
+    momentsOfRow<4>(columns_, weights_, u, equations_);
+    momentsOfRow<5>(columns_, weights_, u, equations_);
+    momentsOfRow<6>(columns_, weights_, u, equations_);
+    momentsOfRow<7>(columns_, weights_, u, equations_);
+    const NormalSolution solution = solve(equations_, kRidge * equations_.matrix[0][0], false);
+    for (size_t c = 0; c < 3; ++c) {
+      std::fill_n(prediction_[c].v, kCount, static_cast<float>(solution.coefficients[0][c]));
+      for (size_t k = 1; k < kColumns; ++k)
+        addScaled(columns_[k].v, static_cast<float>(solution.coefficients[k][c]), prediction_[c].v);
+    }
+  }
+
+  void scatter(int x, int y, std::array<std::vector<float>, 4>& sums) {
+    for (int row = std::max(y - kRadius, target_.y0); row < std::min(y + kRadius + 1, target_.y1); ++row) {
+      const ptrdiff_t at = sumIndex(x - kRadius, row);
+      const int from = (row - (y - kRadius)) * kPitch;
+      addPrediction(weights_.v + from, prediction_[0].v + from, prediction_[1].v + from, prediction_[2].v + from,
+                    sums[0].data() + at, sums[1].data() + at, sums[2].data() + at, sums[3].data() + at);
+    }
+  }
+
+  PixelRect target_, image_;
+  int stride_;
+  float squaredThreshold_;
+  PatchWelchTile tile_;
+  ptrdiff_t sumPitch_;
+  std::vector<std::array<std::vector<float>, 4>> sums_;  // per image: of the weights, and of weighted predictions
+
+  // Of the current fit.
+  std::vector<std::array<Bordered, 3>> radiance_;
+  std::array<Bordered, 3> variance_;
+  std::array<Bordered, PatchWelchTile::kGuides> guide_;
+  Bordered depth_, visibility_, inside_;
+  Windowed inWindow_, mask_, spatial_, edge_, inverse_, inverseCount_, weights_;
+  std::array<Windowed, PatchWelchInput::kMaxImages> patches_;
+  std::array<Windowed, kColumns> columns_;
+  std::array<Windowed, 3> prediction_;
+  NormalEquations equations_;
+};
+
+}  // namespace
+
+std::vector<Rgb<float>> patchWelchFirstOrder(const PatchWelchInput& input, const std::vector<Rgb<float>>& zeroOrder,
+                                             const FirstOrderOptions& options, const std::atomic<bool>* cancel) {
+  BRAID_ASSERT(!input.images.empty() && input.images.size() <= PatchWelchInput::kMaxImages &&
+               zeroOrder.size() == input.images.size() && options.stride >= 1 && options.tileSize >= 1);
+  std::vector<Rgb<float>> out(input.images.size(), Rgb<float>(input.width(), input.height()));
+  forEachTile(input.width(), input.height(), options.tileSize, options.tileSize, [&](const PixelRect& tile) {
+    if (cancel && cancel->load(std::memory_order_relaxed)) return;
+    const auto regression = std::make_unique<TileRegression>(input, options, tile);
+    runVectorised([&] { regression->run(); });
+    regression->write(zeroOrder, options.kappa, out);
+  });
+  return out;
+}
+
+}  // namespace braid

@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combiners/denoise/pw_filter.h"
+
+#include <cmath>
+
+#include "renderer/core/error.h"
+
+namespace braid {
+
+namespace {
+
+constexpr int kRowUnit = 16;  // rows are computed in multiples of this; what is too much is never used
+constexpr int roundUp(int n) { return (n + kRowUnit - 1) / kRowUnit * kRowUnit; }
+
+using Rows3 = std::array<const float*, 3>;
+
+Rows3 rowsAt(const PatchWelchTile::Plane3& planes, ptrdiff_t at) {
+  return {planes[0].data() + at, planes[1].data() + at, planes[2].data() + at};
+}
+
+// out_c = 1 / (V_p + V_q + eps)
+void inverseVarianceRow(const Rows3& p, const Rows3& q, int count, const std::array<float*, 3>& out) {
+  for (size_t c = 0; c < 3; ++c) {
+    const float* __restrict vp = p[c], * __restrict vq = q[c];
+    float* __restrict r = out[c];
+    for (int x = 0; x < count; ++x) r[x] = 1.0f / ((vp[x] + vq[x]) + kPatchWelchEpsilon);
+  }
+}
+
+// out = the sum over the channels of (u_p - u_q)² inverse_c
+void differenceRow(const Rows3& p, const Rows3& q, const Rows3& inverse, int count, float* __restrict out) {
+  const float* __restrict p0 = p[0], * __restrict p1 = p[1], * __restrict p2 = p[2];
+  const float* __restrict q0 = q[0], * __restrict q1 = q[1], * __restrict q2 = q[2];
+  const float* __restrict r0 = inverse[0], * __restrict r1 = inverse[1], * __restrict r2 = inverse[2];
+  for (int x = 0; x < count; ++x) {
+    const float d0 = p0[x] - q0[x], d1 = p1[x] - q1[x], d2 = p2[x] - q2[x];
+    out[x] = (d0 * d0 * r0[x] + d1 * d1 * r1[x]) + d2 * d2 * r2[x];
+  }
+}
+
+void boxRow(const float* __restrict in, int count, float* __restrict out) {
+  for (int x = 0; x < count; ++x) out[x] = (in[x] + in[x + 1]) + in[x + 2];
+}
+
+// out = max(0, 1 - s / t²) with s / t² = (a + b + c) inverseCount scale; whether any is positive. Not-a-number counts
+// as no.
+bool toleranceRow(const Rows3& rows, const float* __restrict inverseCount, float scale, int count,
+                  float* __restrict out) {
+  const float* __restrict a = rows[0], * __restrict b = rows[1], * __restrict c = rows[2];
+  int any = 0;
+  for (int x = 0; x < count; ++x) {
+    const float t = 1.0f - ((a[x] + b[x]) + c[x]) * (inverseCount[x] * scale);
+    out[x] = t > 0 ? t : 0.0f;
+    any |= t > 0;
+  }
+  return any != 0;
+}
+
+// out = 2^(spatial - |guide_p - guide_q|²)
+void edgeRow(const PatchWelchTile& tile, ptrdiff_t p, ptrdiff_t q, float spatial, int count, float* __restrict out) {
+  const auto& g = tile.guide;
+  const float* __restrict p0 = g[0].data() + p, * __restrict q0 = g[0].data() + q;
+  const float* __restrict p1 = g[1].data() + p, * __restrict q1 = g[1].data() + q;
+  const float* __restrict p2 = g[2].data() + p, * __restrict q2 = g[2].data() + q;
+  const float* __restrict p3 = g[3].data() + p, * __restrict q3 = g[3].data() + q;
+  const float* __restrict p4 = g[4].data() + p, * __restrict q4 = g[4].data() + q;
+  const float* __restrict p5 = g[5].data() + p, * __restrict q5 = g[5].data() + q;
+  for (int x = 0; x < count; ++x) {
+    const float d0 = p0[x] - q0[x], d1 = p1[x] - q1[x], d2 = p2[x] - q2[x];
+    const float d3 = p3[x] - q3[x], d4 = p4[x] - q4[x], d5 = p5[x] - q5[x];
+    const float albedo = (d0 * d0 + d1 * d1) + d2 * d2, normal = (d3 * d3 + d4 * d4) + d5 * d5;
+    out[x] = exp2NonPositive(spatial - (albedo + normal));
+  }
+}
+
+void weightRow(float* __restrict tolerance, const float* __restrict edge, int count) {
+  for (int x = 0; x < count; ++x) tolerance[x] = tolerance[x] * tolerance[x] * edge[x];
+}
+
+// Sums of w and of w u for the pixels of a tile, row by row.
+struct Sums {
+  std::array<std::vector<float>, 4> plane;  // weight, then red, green, blue
+};
+
+// The four sums of a row. Each pointer is a parameter: only so does the compiler keep the promise of no overlap.
+void addWeighted(const float* __restrict w, const float* __restrict u0, const float* __restrict u1,
+                 const float* __restrict u2, int count, float* __restrict total, float* __restrict red,
+                 float* __restrict green, float* __restrict blue) {
+  for (int x = 0; x < count; ++x) {
+    total[x] += w[x];
+    red[x] += w[x] * u0[x];
+    green[x] += w[x] * u1[x];
+    blue[x] += w[x] * u2[x];
+  }
+}
+
+void accumulateRow(const float* w, const Rows3& u, int count, Sums& sums, ptrdiff_t at) {
+  auto& s = sums.plane;
+  addWeighted(w, u[0], u[1], u[2], count, s[0].data() + at, s[1].data() + at, s[2].data() + at, s[3].data() + at);
+}
+
+// The filter in one tile. The weight of a pair is the same seen from either pixel, hence only one of d and -d is
+// visited: each weight adds q to the sums of p and p to those of q. Pairs that reach into the tile from outside are
+// computed in the tiles of both pixels, with the same bits.
+class TileFilter {
+ public:
+  TileFilter(const PatchWelchInput& input, const std::vector<float>& squaredThresholds, const PixelRect& tile)
+      : target_(tile),
+        width_(input.width()),
+        height_(input.height()),
+        thresholds_(squaredThresholds),
+        tile_(input, intersection(grown(tile, kPatchWelchWindow + 1), {0, 0, width_, height_})),
+        images_(input.images.size()) {
+    const auto row = static_cast<size_t>(roundUp(tile.width() + kPatchWelchWindow + 2) + 2 * kRowUnit);
+    for (std::vector<float>& b : inverse_) b.resize(row);
+    for (auto& image : patchRows_)
+      for (std::vector<float>& b : image) b.resize(row);
+    for (std::vector<float>* b : {&difference_, &inverseCount_, &weight_, &edge_}) b->resize(row);
+    startAtCentre();
+  }
+
+  void run() {
+    for (int dy = 0; dy <= kPatchWelchWindow; ++dy)
+      for (int dx = dy == 0 ? 1 : -kPatchWelchWindow; dx <= kPatchWelchWindow; ++dx) visit(dx, dy);
+  }
+
+  // The weighted means, with the albedo back in place.
+  void write(std::vector<std::vector<Rgb<float>>>& out) const {
+    for (size_t k = 0; k < thresholds_.size(); ++k)
+      for (size_t i = 0; i < images_; ++i)
+        for (size_t c = 0; c < 3; ++c)
+          for (int y = target_.y0; y < target_.y1; ++y) {
+            const Sums& sums = sums_[k * images_ + i];
+            const float* __restrict sum = sums.plane[1 + c].data() + sumIndex(target_.x0, y);
+            const float* __restrict total = sums.plane[0].data() + sumIndex(target_.x0, y);
+            const float* __restrict a = tile_.divisor[c].data() + tile_.index(target_.x0, y);
+            float* __restrict to = &out[k][i][c].at(target_.x0, y);
+            for (int x = 0; x < target_.width(); ++x) to[x] = a[x] * (sum[x] / total[x]);
+          }
+  }
+
+ private:
+  ptrdiff_t sumIndex(int x, int y) const {
+    return static_cast<ptrdiff_t>(y - target_.y0) * target_.width() + (x - target_.x0);
+  }
+
+  // The weight of a pixel with itself is 1.
+  void startAtCentre() {
+    const auto area = static_cast<size_t>(target_.width()) * static_cast<size_t>(target_.height());
+    sums_.resize(thresholds_.size() * images_);
+    for (size_t k = 0; k < sums_.size(); ++k) {
+      sums_[k].plane[0].assign(area, 1.0f);
+      for (size_t c = 0; c < 3; ++c) {
+        sums_[k].plane[1 + c].resize(area);
+        const std::vector<float>& u = tile_.radiance[k % images_][c];
+        for (int y = target_.y0; y < target_.y1; ++y)
+          std::copy_n(u.data() + tile_.index(target_.x0, y), target_.width(),
+                      sums_[k].plane[1 + c].data() + sumIndex(target_.x0, y));
+      }
+    }
+  }
+
+  // All pairs (p, p + d) with a pixel in the tile; dy >= 0.
+  void visit(int dx, int dy) {
+    const PixelRect reach = {target_.x0 - std::max(dx, 0), target_.y0 - dy, target_.x1 + std::max(-dx, 0), target_.y1};
+    const PixelRect pairs = pairsAt(dx, dy, width_, height_), p = intersection(reach, pairs);
+    if (p.empty()) return;
+    for (int x = p.x0; x < p.x1; ++x)
+      inverseCount_[static_cast<size_t>(x - p.x0)] =
+          1.0f / static_cast<float>(3 * patchCount(x, 1, pairs.x0, pairs.x1));
+    const double distance2 = dx * dx + dy * dy;
+    const auto spatial = static_cast<float>(-static_cast<double>(kLog2E) * distance2 /
+                                            (2 * kPatchWelchSpatialSd * kPatchWelchSpatialSd));
+    for (int y = p.y0 - 1; y <= p.y1; ++y) {
+      patchRow(p, pairs, y, dx, dy);
+      if (y > p.y0) accumulate(p, pairs, y - 1, dx, dy, spatial);
+    }
+  }
+
+  float* patchRowOf(size_t image, int y) { return patchRows_[image][static_cast<size_t>(y + 3) % 3].data(); }
+
+  // Row y of z², summed over three neighbours in x, of every image; zeros outside the image.
+  void patchRow(const PixelRect& p, const PixelRect& pairs, int y, int dx, int dy) {
+    const int count = roundUp(p.width());
+    if (y < pairs.y0 || y >= pairs.y1) {
+      for (size_t i = 0; i < images_; ++i) std::fill_n(patchRowOf(i, y), count, 0.0f);
+      return;
+    }
+    const int x0 = std::max(p.x0 - 1, pairs.x0), x1 = std::min(p.x1 + 1, pairs.x1), padded = roundUp(x1 - x0);
+    const ptrdiff_t at = tile_.index(x0, y), to = tile_.index(x0 + dx, y + dy);
+    inverseVarianceRow(rowsAt(tile_.variance, at), rowsAt(tile_.variance, to), padded,
+                       {inverse_[0].data(), inverse_[1].data(), inverse_[2].data()});
+    float* z2 = difference_.data() + (x0 - (p.x0 - 1));  // difference_[0] belongs to p.x0 - 1
+    difference_[0] = 0;
+    for (size_t i = 0; i < images_; ++i) {
+      differenceRow(rowsAt(tile_.radiance[i], at), rowsAt(tile_.radiance[i], to),
+                    {inverse_[0].data(), inverse_[1].data(), inverse_[2].data()}, padded, z2);
+      std::fill(z2 + (x1 - x0), z2 + padded + 2, 0.0f);
+      boxRow(difference_.data(), count, patchRowOf(i, y));
+    }
+  }
+
+  // Adds the pairs of row y to the sums of both pixels.
+  void accumulate(const PixelRect& p, const PixelRect& pairs, int y, int dx, int dy, float spatial) {
+    const int count = roundUp(p.width());
+    const float inverseRows = 1.0f / static_cast<float>(patchCount(y, 1, pairs.y0, pairs.y1));
+    bool edgeReady = false;
+    for (size_t i = 0; i < images_; ++i)
+      for (size_t k = 0; k < thresholds_.size(); ++k) {
+        const float scale = inverseRows / (thresholds_[k] * PatchWelchInput::varianceFactor(i));
+        if (!toleranceRow({patchRowOf(i, y - 1), patchRowOf(i, y), patchRowOf(i, y + 1)}, inverseCount_.data(), scale,
+                          count, weight_.data()))
+          continue;
+        if (!edgeReady)
+          edgeRow(tile_, tile_.index(p.x0, y), tile_.index(p.x0 + dx, y + dy), spatial, count, edge_.data());
+        edgeReady = true;
+        weightRow(weight_.data(), edge_.data(), count);
+        addToBoth(p, y, dx, dy, tile_.radiance[i], sums_[k * images_ + i]);
+      }
+  }
+
+  void addToBoth(const PixelRect& p, int y, int dx, int dy, const PatchWelchTile::Plane3& u, Sums& sums) {
+    const int x0 = std::max(p.x0, target_.x0), x1 = std::min(p.x1, target_.x1);  // pixels p in the tile
+    if (y >= target_.y0 && x0 < x1)
+      accumulateRow(weight_.data() + (x0 - p.x0), rowsAt(u, tile_.index(x0 + dx, y + dy)), x1 - x0, sums,
+                    sumIndex(x0, y));
+    const int q0 = std::max(p.x0 + dx, target_.x0), q1 = std::min(p.x1 + dx, target_.x1);  // pixels q in the tile
+    if (y + dy < target_.y1 && q0 < q1)
+      accumulateRow(weight_.data() + (q0 - dx - p.x0), rowsAt(u, tile_.index(q0 - dx, y)), q1 - q0, sums,
+                    sumIndex(q0, y + dy));
+  }
+
+  PixelRect target_;
+  int width_, height_;  // of the image
+  const std::vector<float>& thresholds_;
+  PatchWelchTile tile_;
+  size_t images_;
+  std::vector<Sums> sums_;  // [threshold][image]
+  std::array<std::vector<float>, 3> inverse_;
+  std::array<std::array<std::vector<float>, 3>, PatchWelchInput::kMaxImages> patchRows_;  // the last three rows
+  std::vector<float> difference_, inverseCount_, weight_, edge_;
+};
+
+}  // namespace
+
+double studentQuantile(double z, uint64_t dof) {
+  const auto v = static_cast<double>(dof);
+  // Cornish-Fisher expansion, better than 10⁻⁵ here.
+  if (dof > 60 || dof % 2 == 1) {
+    const double z2 = z * z, z3 = z2 * z, z5 = z3 * z2, z7 = z5 * z2;
+    return z + (z3 + z) / (4 * v) + (5 * z5 + 16 * z3 + 3 * z) / (96 * v * v) +
+           (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * v * v * v);
+  }
+  // With u = t / sqrt(v + t²), P(T <= t) - 1/2 = u / 2 Σ_j c_j (1 - u²)^j for j < v / 2, c_j = c_{j-1} (2j - 1) / (2j)
+  // (Abramowitz & Stegun 26.7.4). It grows with u: bisection.
+  const double target = std::erf(z / std::sqrt(2.0));
+  double low = 0, high = 1;
+  for (int step = 0; step < 60; ++step) {
+    const double u = 0.5 * (low + high);
+    double term = 1, sum = 1;
+    for (uint64_t j = 1; j < dof / 2; ++j) {
+      term *= (1 - u * u) * static_cast<double>(2 * j - 1) / static_cast<double>(2 * j);
+      sum += term;
+    }
+    (u * sum < target ? low : high) = u;
+  }
+  return low * std::sqrt(v / (1 - low * low));
+}
+
+float squaredThreshold(double z, uint64_t passes) {
+  BRAID_ASSERT(passes >= 2);
+  const double t = studentQuantile(z, 2 * passes - 2);
+  return static_cast<float>(t * t);
+}
+
+std::vector<std::vector<Rgb<float>>> patchWelch(const PatchWelchInput& input, std::span<const double> thresholds,
+                                                TileSize tiles, const std::atomic<bool>* cancel) {
+  BRAID_ASSERT(!thresholds.empty() && !input.images.empty() && input.images.size() <= PatchWelchInput::kMaxImages);
+  const int width = input.width(), height = input.height();
+  std::vector<std::vector<Rgb<float>>> out(thresholds.size(),
+                                           std::vector<Rgb<float>>(input.images.size(), Rgb<float>(width, height)));
+  std::vector<float> squared;
+  for (const double z : thresholds) squared.push_back(squaredThreshold(z, input.passes));
+  forEachTile(width, height, tiles.width, tiles.height, [&](const PixelRect& tile) {
+    if (cancel && cancel->load(std::memory_order_relaxed)) return;
+    TileFilter filter(input, squared, tile);
+    runVectorised([&] { filter.run(); });
+    filter.write(out);
+  });
+  return out;
+}
+
+}  // namespace braid

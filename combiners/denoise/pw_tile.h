@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the patch-Welch filters see of a tile: radiance divided by albedo, its variance, and scaled features.
+//
+// The albedo of the first hit is taken out of the radiance before filtering and put back afterwards (demodulation), so
+// that textures do not keep pixels apart. It is treated as exact.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "combiners/denoise/window.h"
+#include "renderer/film/estimates.h"
+
+namespace braid {
+
+// One estimate and its features, as the filters use them: one image, or three with the halves. The references outlive
+// this.
+struct PatchWelchInput {
+  const Features* features = nullptr;     // null, or with planes that may be empty
+  std::vector<const Rgb<float>*> images;  // the mean; then the halves, if there are any
+  Rgb<float> variance;                    // of the mean, regularised; that of a half is twice as large
+  uint64_t passes = 0;
+  float depthScale = 0;  // 1 / mean depth of what was hit
+
+  static constexpr size_t kMaxImages = 3;
+  // Var images[i] / Var images[0].
+  static float varianceFactor(size_t image) { return image == 0 ? 1.0f : 2.0f; }
+  int width() const { return images[0]->width(); }
+  int height() const { return images[0]->height(); }
+};
+
+// The input of an estimate. Its variance is empty where nothing is known of it (see regularisedVariance); there is
+// nothing to filter then.
+PatchWelchInput patchWelchInput(const Estimate& estimate, const Features* features);
+
+// Contiguous copies of the pixels of a rectangle. Non-finite values are zero. Rows are padded so that whole vectors
+// may be read past their ends.
+struct PatchWelchTile {
+  static constexpr int kPadding = 32;
+  static constexpr size_t kGuides = 6;
+  using Plane3 = std::array<std::vector<float>, 3>;
+
+  PixelRect rect;  // of the image
+  ptrdiff_t pitch = 0;
+  std::vector<Plane3> radiance;  // per image: mean / divisor
+  Plane3 variance;               // variance of the mean / divisor²
+  Plane3 divisor;                // max(albedo, 0.03); 1 on emitters, misses and without features
+  // Albedo in [0, 1] and normal, times sqrt(log2(e) / (2 sd²)): 2^-|difference|² is the product of both Gaussian edge
+  // terms. Zero without features.
+  std::array<std::vector<float>, kGuides> guide;
+  std::vector<float> depth, visibility;  // depth in units of the mean depth; zero without features
+
+  PatchWelchTile(const PatchWelchInput& input, const PixelRect& pixels);
+  ptrdiff_t index(int x, int y) const { return static_cast<ptrdiff_t>(y - rect.y0) * pitch + (x - rect.x0); }
+
+ private:
+  void storeFeatures(const PatchWelchInput& input, size_t i, size_t at);
+};
+
+}  // namespace braid

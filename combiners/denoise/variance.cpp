@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combiners/denoise/variance.h"
+
+#include <cmath>
+
+#include "combiners/denoise/window.h"
+#include "renderer/film/box_sum.h"
+
+namespace braid {
+
+namespace {
+
+constexpr double kPriorWeight = 16;  // degrees of freedom
+constexpr int kBoxRadius = 3;
+
+float finiteVariance(float v) { return std::isfinite(v) && v > 0 ? v : 0.0f; }
+
+// The variance of the mean from its halves, one degree of freedom a pixel.
+Plane<float> varianceFromHalves(const Plane<float>& a, const Plane<float>& b, uint64_t passes) {
+  const double n = static_cast<double>(passes), countA = static_cast<double>((passes + 1) / 2);
+  const auto factor = static_cast<float>(countA * (n - countA) / (n * n));
+  Plane<float> out(a.width, a.height);
+  for (size_t i = 0; i < out.size(); ++i) out[i] = finiteVariance(factor * (a[i] - b[i]) * (a[i] - b[i]));
+  return out;
+}
+
+// Shrinks `v` towards its box mean; `own` is the weight of the pixel's own value against the box's.
+void shrink(Plane<float>& v, double own) {
+  const Plane<double> box = boxSum(v, kBoxRadius);
+  parallelRows(v.height, [&](int y) {
+    const int rows = patchCount(y, kBoxRadius, 0, v.height);
+    for (int x = 0; x < v.width; ++x) {
+      const double mean = box.at(x, y) / (rows * patchCount(x, kBoxRadius, 0, v.width));
+      float& value = v.at(x, y);
+      value = static_cast<float>((own * static_cast<double>(value) + kPriorWeight * mean) / (own + kPriorWeight));
+    }
+  });
+}
+
+}  // namespace
+
+Rgb<float> regularisedVariance(const Estimate& estimate) {
+  const uint64_t n = passesOf(estimate);
+  const bool halves = !estimate.half[0].empty() && !estimate.half[1].empty() && n >= 2;
+  const bool known = !estimate.variance.empty() && n >= 2;
+  if (!halves && !known) return {};
+  const bool fromHalves = halves && (n < 4 || !known);
+  Rgb<float> out;
+  for (size_t c = 0; c < 3; ++c) {
+    if (fromHalves) {
+      out[c] = varianceFromHalves(estimate.half[0][c], estimate.half[1][c], n);
+    } else {
+      out[c] = estimate.variance[c];
+      for (float& v : out[c].data) v = finiteVariance(v);
+    }
+    shrink(out[c], fromHalves ? 0.0 : static_cast<double>(n - 1));
+  }
+  return out;
+}
+
+}  // namespace braid

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// What filters over square windows share: tiles, the pixel pairs of an offset, a vectorisable exp2, and the choice of
+// the instruction set.
+//
+// The fast order of a window filter on a processor with vector units is tile by tile, offset by offset, row by row: at
+// a fixed offset, neighbouring pixels do the same arithmetic on neighbouring data, and patch sums of differences are
+// box sums. A pixel's sums run over the offsets in the same order in every tile, so that neither the size of the tiles
+// nor the number of threads changes a bit.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "renderer/core/parallel.h"
+#include "renderer/core/plane.h"
+
+namespace braid {
+
+// Pixels x0 <= x < x1, y0 <= y < y1.
+struct PixelRect {
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  int width() const { return x1 - x0; }
+  int height() const { return y1 - y0; }
+  bool empty() const { return x1 <= x0 || y1 <= y0; }
+};
+
+inline PixelRect intersection(const PixelRect& a, const PixelRect& b) {
+  return {std::max(a.x0, b.x0), std::max(a.y0, b.y0), std::min(a.x1, b.x1), std::min(a.y1, b.y1)};
+}
+
+inline PixelRect grown(const PixelRect& r, int by) { return {r.x0 - by, r.y0 - by, r.x1 + by, r.y1 + by}; }
+
+// The pixels p of a width x height image for which p + (dx, dy) is in the image too.
+inline PixelRect pairsAt(int dx, int dy, int width, int height) {
+  return {std::max(0, -dx), std::max(0, -dy), std::min(width, width - dx), std::min(height, height - dy)};
+}
+
+// How many of the positions [x - radius, x + radius] lie in [begin, end); for x in that range.
+inline int patchCount(int x, int radius, int begin, int end) {
+  return std::min(end - 1, x + radius) - std::max(begin, x - radius) + 1;
+}
+
+// Calls body(rect) for the tiles of an image, in any order on any thread.
+template <class Body>
+void forEachTile(int width, int height, int tileWidth, int tileHeight, const Body& body) {
+  const int columns = (width + tileWidth - 1) / tileWidth, rows = (height + tileHeight - 1) / tileHeight;
+  parallelChunks(static_cast<size_t>(columns) * static_cast<size_t>(rows), 1, [&](size_t i, size_t) {
+    const int x0 = static_cast<int>(i % static_cast<size_t>(columns)) * tileWidth;
+    const int y0 = static_cast<int>(i / static_cast<size_t>(columns)) * tileHeight;
+    body(PixelRect{x0, y0, std::min(width, x0 + tileWidth), std::min(height, y0 + tileHeight)});
+  });
+}
+
+inline constexpr float kLog2E = 1.44269504088896f;
+
+// 2^x for x <= 0; the relative error is below 5e-7, exact at 0. Arguments below -126, and NaN, give 2^-126: nothing in
+// practice, and never a subnormal. Adding and subtracting 1.5 * 2^23 rounds to the nearest integer and leaves it in the
+// low bits; the polynomial is the Taylor series of 2^f on [-1/2, 1/2] up to f^5, with f^6 replaced by the Chebyshev fit
+// of lower degree.
+inline float exp2NonPositive(float x) {
+  constexpr float kMagic = 12582912.0f;
+  x = x > -126.0f ? x : -126.0f;
+  const float shifted = x + kMagic;
+  const float f = x - (shifted - kMagic);
+  float p = 0.00967589f + f * 0.00133335581f;
+  p = 0.0555041087f + f * p;
+  p = 0.240221092f + f * p;
+  p = 1.0f + f * (0.693147181f + f * p);
+  return std::bit_cast<float>(std::bit_cast<int32_t>(p) + (std::bit_cast<int32_t>(shifted) << 23));
+}
+
+#if defined(__x86_64__) && defined(__GNUC__)
+#define BRAID_AVX512 "avx512f,avx512bw,avx512dq,avx512vl"
+#if defined(__clang__)
+#define BRAID_WIDE ""
+#else
+#define BRAID_WIDE ",prefer-vector-width=512"
+#endif
+template <class Body>
+__attribute__((target(BRAID_AVX512 BRAID_WIDE), flatten, noinline)) void runWithAvx512(const Body& b) {
+  b();
+}
+template <class Body>
+__attribute__((target("avx2"), flatten, noinline)) void runWithAvx2(const Body& b) {
+  b();
+}
+#undef BRAID_AVX512
+#undef BRAID_WIDE
+#endif
+
+// The instruction set that runVectorised() uses on this processor.
+enum class VectorLevel { Baseline, Avx2, Avx512 };
+inline VectorLevel vectorLevel() {
+#if defined(__x86_64__) && defined(__GNUC__)
+  static const VectorLevel level = [] {
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
+        __builtin_cpu_supports("avx512vl"))
+      return VectorLevel::Avx512;
+    return __builtin_cpu_supports("avx2") ? VectorLevel::Avx2 : VectorLevel::Baseline;
+  }();
+  return level;
+#else
+  return VectorLevel::Baseline;
+#endif
+}
+
+// Calls body() in the widest instruction set of this processor: everything that it calls and the compiler sees is
+// compiled for each. The results have the same bits in all of them as long as body() does nothing but float arithmetic
+// without contraction (-ffp-contract=off).
+template <class Body>
+void runVectorised(const Body& body) {
+#if defined(__x86_64__) && defined(__GNUC__)
+  if (vectorLevel() == VectorLevel::Avx512) return runWithAvx512(body);
+  if (vectorLevel() == VectorLevel::Avx2) return runWithAvx2(body);
+#endif
+  body();
+}
+
+}  // namespace braid

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// The numbers of the double shrinkage estimator (DSCombiner; ALGORITHMS 3): squared errors in, weights out.
+#pragma once
+
+#include "renderer/film/estimates.h"
+
+namespace braid {
+
+// The maximum of the posterior of X given X_u ~ N(X, E_u), X_b ~ N(X, E_b) and the prior X ~ N(X_p, eta²): the mean of
+// the three weighted by their precisions, written as two shrinkages (Eqs. 8-10; the printed marginal of X_b has the
+// mean X_p, it must be X).
+struct DoubleShrinkage {
+  double toBiased = 0;  // kappa_1 = E_u / (E_u + E_b): m = kappa_1 X_b + (1 - kappa_1) X_u
+  double toPrior = 0;   // kappa_2 = h / (h + eta²): kappa_2 X_p + (1 - kappa_2) m
+  double variance = 0;  // of the posterior: h eta² / (h + eta²), with h = E_u E_b / (E_u + E_b)
+};
+
+// Squared errors >= 0; an infinite one takes its image out, a zero takes the others out.
+DoubleShrinkage doubleShrinkage(double unbiasedError, double biasedError, double priorError);
+
+// E_u: the variance of the mean, averaged over channels and over 13 x 13 pixels: a box, lest an outlier lend its error
+// to too few of its neighbours (ALGORITHMS 1.4). At least 10⁻⁸ (x² + 10⁻⁴).
+Plane<float> unbiasedError(const Estimate& unbiased, const Rgb<float>& variance);
+
+// E_b: variance plus squared bias, averaged over channels and smoothed over 13 x 13 pixels along surfaces, for bias has
+// structure. With an estimate of the bias (photon maps, ALGORITHMS 6.2) gamma² is its square less its variance, not
+// below 0; else, with halves, the error across halves (4.4), which holds any bias; else (Y - X)² less the variance,
+// which is too small, for Y has seen the samples of X. At least 10⁻⁸ (y² + 10⁻⁴).
+Plane<float> biasedError(const Estimate& biased, const Estimate& unbiased, const Rgb<float>& variance,
+                         const Features* features);
+
+// eta²: the squared error of the prior, measured across halves as in error_map.h and averaged over 13 x 13 pixels
+// (ALGORITHMS 3.4). Residuals are first limited to 8 times the deviation of their surroundings: that of X, or the root
+// mean square of the other residuals, whichever is larger. With X's alone a prior that is wrong everywhere would keep a
+// weight of 1/127 however small the noise. At least 10⁻⁶ (x_p² + 10⁻²), so that a converged image is left alone.
+Plane<float> priorError(const Rgb<float>& prior, const Rgb<float> (&halves)[2], const Estimate& unbiased,
+                        const Rgb<float>& variance, const Plane<float>& unbiasedError);
+
+}  // namespace braid

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// Ensemble denoising: the mean of several denoised images with the weights that minimise its squared error, estimated
+// from two halves of the samples ("Ensemble Denoising for Monte Carlo Renderings"). It is consistent as soon as one of
+// the bases is. Weights are solved per pixel and channel and then smoothed (combiners/ensemble_weights.h and
+// combiners/weight_filter.h); the halves of the result are the halves of the bases with the same weights.
+#include <algorithm>
+
+#include "combiners/ensemble_weights.h"
+#include "combiners/error_map.h"
+#include "combiners/recipe.h"
+#include "combiners/registry.h"
+#include "combiners/weight_filter.h"
+
+namespace braid {
+
+namespace {
+
+const OptionInfo kPatch{"ensemble-patch", 7,
+                        "Width in pixels of the patches that errors are summed over; 1: the paper"};
+const OptionInfo kFilter{"ensemble-filter", 1, "1: smooth the weights by a cross bilateral filter; 0: do not"};
+const OptionInfo kShared{"ensemble-shared", 0, "1: the same weights for all channels; 0: weights per channel"};
+const OptionInfo kNonNegative{"ensemble-non-negative", 1, "0: weights may be negative, which makes fireflies"};
+const OptionInfo kFullError{"ensemble-full-error", 0, "1: errors of the whole images in place of those of the halves"};
+
+// Fewer passes leave too few in each half to tell the bases apart.
+constexpr uint64_t kFewestPasses = 8;
+
+class Ensemble : public Method {
+ public:
+  const char* name() const override { return "ensemble"; }
+  const char* description() const override { return "Mean of several denoised images with optimised weights"; }
+  MethodKind kind() const override { return MethodKind::Combiner; }
+  Needs needs() const override {
+    Needs needs;
+    needs.bases = 2;
+    needs.features = true;
+    needs.variance = false;
+    return needs;
+  }
+  std::vector<OptionInfo> options() const override { return {kPatch, kFilter, kShared, kNonNegative, kFullError}; }
+  MethodResult run(const MethodInputs& in) const override;
+};
+
+EnsembleChoices choicesOf(const MethodOptions& options) {
+  EnsembleChoices choices;
+  choices.patchRadius = static_cast<int>(std::clamp(options.number(kPatch), 1.0, 101.0)) / 2;
+  choices.shared = options.number(kShared) != 0;
+  choices.nonNegative = options.number(kNonNegative) != 0;
+  choices.fullError = options.number(kFullError) != 0;
+  return choices;
+}
+
+Attribute remark(const char* name, const std::string& text) {
+  Attribute a;
+  a.name = name;
+  a.text = text;
+  return a;
+}
+
+MethodResult Ensemble::run(const MethodInputs& in) const {
+  MethodResult result;
+  const EnsembleChoices choices = choicesOf(in.options);
+  const uint64_t passes = in.unbiased->passes;
+  WeightMaps weights;
+  if (passes > 0 && passes < kFewestPasses) {
+    weights = uniformWeights(in.bases.size(), 1, in.unbiased->mean.width(), in.unbiased->mean.height());
+    result.remarks.push_back(remark("weights", "equal, for there are fewer than 8 passes"));
+  } else {
+    weights = ensembleWeights(*in.unbiased, in.bases, choices);
+    if (in.options.number(kFilter) != 0)
+      weights = filteredWeights(weights, weightedEstimate(weights, in.bases), in.features);
+  }
+  result.image = weightedEstimate(weights, in.bases);
+  result.error = errorMap(result.image.half, *in.unbiased, meanVariance(*in.unbiased), result.image.mean);
+  std::vector<Plane<float>> maps = channelMeans(weights);
+  for (size_t b = 0; b < in.bases.size(); ++b) {
+    const std::string& base = in.bases[b]->name;
+    result.aovs.push_back(
+        {"weight.ensemble." + (base.empty() ? std::to_string(b) : layerName(base)), std::move(maps[b])});
+    if (in.bases[b]->unbiased)
+      result.remarks.push_back(remark("warning", "the unbiased image as a base makes the ensemble much worse"));
+  }
+  return result;
+}
+
+}  // namespace
+
+std::unique_ptr<Method> make_ensemble() { return std::make_unique<Ensemble>(); }
+
+}  // namespace braid

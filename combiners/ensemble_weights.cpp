@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combiners/ensemble_weights.h"
+
+#include <algorithm>
+
+#include "combiners/denoise/window.h"
+#include "combiners/finite_float.h"
+#include "combiners/simplex_solver.h"
+
+namespace braid {
+
+namespace {
+
+constexpr int kTileWidth = 128, kTileHeight = 32;
+
+// Row `y` of a plane from column x on.
+const float* rowOf(const Plane<float>& p, int x, int y) { return p.data.data() + p.index(x, y); }
+
+// Solves the pixels of one tile.
+class TileWeights {
+ public:
+  TileWeights(const Estimate& x, const std::vector<const Estimate*>& bases, const EnsembleChoices& choices)
+      : x_(x), bases_(bases), choices_(choices), pairs_(bases.size() * (bases.size() + 1) / 2) {}
+  void solve(const PixelRect& tile, WeightMaps& out);
+
+ private:
+  void startSums(const PixelRect& tile);
+  void errorsOfRow(size_t c, int y);
+  void addChannel(size_t c);
+  void addPatchRow(size_t pair, const double* products, int y);
+  void writeWeights(size_t c, WeightMaps& out);
+
+  const Estimate& x_;
+  const std::vector<const Estimate*>& bases_;
+  const EnsembleChoices& choices_;
+  size_t pairs_;
+  PixelRect tile_, samples_;                // the pixels solved, and those in their patches
+  std::vector<double> errors_;              // three terms a base and column: e^A, e^B, (y^A - y^B) / sqrt(2)
+  std::vector<double> products_, rowSums_;  // of one row and pair
+  std::vector<double> sums_;                // M by pair and pixel of the tile
+};
+
+void TileWeights::startSums(const PixelRect& tile) {
+  tile_ = tile;
+  samples_ = intersection(grown(tile, choices_.patchRadius), {0, 0, x_.mean.width(), x_.mean.height()});
+  errors_.resize(3 * bases_.size() * static_cast<size_t>(samples_.width()));
+  products_.resize(static_cast<size_t>(samples_.width()));
+  rowSums_.resize(static_cast<size_t>(tile.width()));
+  sums_.assign(pairs_ * static_cast<size_t>(tile.width() * tile.height()), 0.0);
+}
+
+void TileWeights::errorsOfRow(size_t c, int y) {
+  const auto width = static_cast<size_t>(samples_.width());
+  const float *xa = rowOf(x_.half[0][c], samples_.x0, y), *xb = rowOf(x_.half[1][c], samples_.x0, y);
+  for (size_t b = 0; b < bases_.size(); ++b) {
+    const float *ya = rowOf(bases_[b]->half[0][c], samples_.x0, y), *yb = rowOf(bases_[b]->half[1][c], samples_.x0, y);
+    double *ea = errors_.data() + 3 * b * width, *eb = ea + width, *d = eb + width;
+    for (size_t i = 0; i < width; ++i) {
+      ea[i] = static_cast<double>(ya[i]) - static_cast<double>(xb[i]);
+      eb[i] = static_cast<double>(yb[i]) - static_cast<double>(xa[i]);
+      d[i] = choices_.fullError ? 0.70710678118654752 * (static_cast<double>(ya[i]) - static_cast<double>(yb[i])) : 0.0;
+    }
+  }
+}
+
+// Adds the patch sums of a row of samples to the rows of the tile whose patches hold it.
+void TileWeights::addPatchRow(size_t pair, const double* products, int y) {
+  const int radius = choices_.patchRadius, width = tile_.width();
+  for (int x = 0; x < width; ++x) rowSums_[static_cast<size_t>(x)] = 0;
+  for (int k = -radius; k <= radius; ++k) {
+    const int from = std::max(tile_.x0, samples_.x0 - k), to = std::min(tile_.x1, samples_.x1 - k);
+    const double* in = products + (from + k - samples_.x0);
+    double* out = rowSums_.data() + (from - tile_.x0);
+    for (int x = 0; x < to - from; ++x) out[x] += in[x];
+  }
+  for (int row = std::max(tile_.y0, y - radius); row < std::min(tile_.y1, y + radius + 1); ++row) {
+    double* out = sums_.data() + (pair * static_cast<size_t>(tile_.height()) + static_cast<size_t>(row - tile_.y0)) *
+                                     static_cast<size_t>(width);
+    for (int x = 0; x < width; ++x) out[x] += rowSums_[static_cast<size_t>(x)];
+  }
+}
+
+void TileWeights::addChannel(size_t c) {
+  const auto width = static_cast<size_t>(samples_.width());
+  for (int y = samples_.y0; y < samples_.y1; ++y) {
+    errorsOfRow(c, y);
+    size_t pair = 0;
+    for (size_t i = 0; i < bases_.size(); ++i)
+      for (size_t j = 0; j <= i; ++j, ++pair) {
+        const double *p = errors_.data() + 3 * i * width, *q = errors_.data() + 3 * j * width;
+        // Both halves and the reduction; a common factor of two does not matter.
+        for (size_t k = 0; k < width; ++k)
+          products_[k] = p[k] * q[k] + p[width + k] * q[width + k] - p[2 * width + k] * q[2 * width + k];
+        addPatchRow(pair, products_.data(), y);
+      }
+  }
+}
+
+// Solves for all pixels of the tile; the weights are those of channel c, or of all.
+void TileWeights::writeWeights(size_t c, WeightMaps& out) {
+  SimplexSolver solver(bases_.size(), choices_.nonNegative);
+  const size_t count = static_cast<size_t>(tile_.width() * tile_.height());
+  for (size_t begin = 0; begin < count; begin += SimplexSolver::kLanes) {
+    const size_t lanes = std::min<size_t>(SimplexSolver::kLanes, count - begin);
+    size_t pair = 0;
+    for (size_t i = 0; i < bases_.size(); ++i)
+      for (size_t j = 0; j <= i; ++j, ++pair) {
+        double* to = solver.entry(i, j);
+        std::fill_n(to, SimplexSolver::kLanes, 0.0);
+        std::copy_n(sums_.data() + pair * count + begin, lanes, to);
+      }
+    solver.solve();
+    for (size_t b = 0; b < bases_.size(); ++b)
+      for (size_t l = 0; l < lanes; ++l) {
+        const auto at = static_cast<int>(begin + l);
+        out.of(b, c).at(tile_.x0 + at % tile_.width(), tile_.y0 + at / tile_.width()) =
+            static_cast<float>(solver.weight(b)[l]);
+      }
+  }
+}
+
+void TileWeights::solve(const PixelRect& tile, WeightMaps& out) {
+  startSums(tile);
+  for (size_t c = 0; c < 3; ++c) {
+    if (!choices_.shared) std::fill(sums_.begin(), sums_.end(), 0.0);
+    runVectorised([&] { addChannel(c); });
+    if (!choices_.shared || c == 2) writeWeights(c, out);
+  }
+}
+
+}  // namespace
+
+WeightMaps uniformWeights(size_t bases, size_t channels, int width, int height) {
+  return {bases, channels,
+          std::vector<Plane<float>>(bases * channels, Plane<float>(width, height, 1.0f / static_cast<float>(bases)))};
+}
+
+WeightMaps ensembleWeights(const Estimate& unbiased, const std::vector<const Estimate*>& bases,
+                           const EnsembleChoices& choices) {
+  const int width = unbiased.mean.width(), height = unbiased.mean.height();
+  WeightMaps out = uniformWeights(bases.size(), choices.shared ? 1 : 3, width, height);
+  forEachTile(width, height, kTileWidth, kTileHeight,
+              [&](const PixelRect& tile) { TileWeights(unbiased, bases, choices).solve(tile, out); });
+  return out;
+}
+
+Rgb<float> weightedImage(const WeightMaps& weights, const std::vector<const Rgb<float>*>& images) {
+  Rgb<float> out(images[0]->width(), images[0]->height());
+  for (size_t c = 0; c < 3; ++c)
+    parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        double sum = 0;
+        for (size_t b = 0; b < images.size(); ++b)
+          sum += static_cast<double>(weights.of(b, c)[i]) * static_cast<double>((*images[b])[c][i]);
+        out[c][i] = finiteFloat(sum);
+      }
+    });
+  return out;
+}
+
+Estimate weightedEstimate(const WeightMaps& weights, const std::vector<const Estimate*>& bases) {
+  const auto collect = [&](auto get) {
+    std::vector<const Rgb<float>*> images;
+    for (const Estimate* base : bases) images.push_back(get(*base));
+    return weightedImage(weights, images);
+  };
+  Estimate out;
+  out.mean = collect([](const Estimate& e) { return &e.mean; });
+  for (int h = 0; h < 2; ++h) out.half[h] = collect([h](const Estimate& e) { return &e.half[h]; });
+  return out;
+}
+
+std::vector<Plane<float>> channelMeans(const WeightMaps& weights) {
+  std::vector<Plane<float>> out;
+  for (size_t b = 0; b < weights.bases; ++b) {
+    Plane<float> mean = weights.of(b, 0);
+    for (size_t i = 0; i < mean.size(); ++i) mean[i] = (mean[i] + weights.of(b, 1)[i] + weights.of(b, 2)[i]) / 3;
+    out.push_back(std::move(mean));
+  }
+  return out;
+}
+
+}  // namespace braid

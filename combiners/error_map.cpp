@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combiners/error_map.h"
+
+#include <algorithm>
+
+#include "combiners/box_mean.h"
+#include "combiners/finite_float.h"
+#include "renderer/core/parallel.h"
+
+namespace braid {
+
+namespace {
+
+constexpr size_t kChunk = 4096;
+
+// map(i, c) averaged over channels.
+template <class Map>
+Plane<float> channelMean(int width, int height, const Map& map) {
+  Plane<float> out(width, height);
+  parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      double sum = 0;
+      for (size_t c = 0; c < 3; ++c) sum += map(i, c);
+      out[i] = finiteFloat(sum / 3);
+    }
+  });
+  return out;
+}
+
+double squaredDifference(const Rgb<float>& a, const Rgb<float>& b, size_t i, size_t c) {
+  const double d = static_cast<double>(a[c][i]) - static_cast<double>(b[c][i]);
+  return d * d;
+}
+
+Plane<float> varianceSamples(const Rgb<float> (&halves)[2]) {
+  return channelMean(halves[0].width(), halves[0].height(),
+                     [&](size_t i, size_t c) { return 0.25 * squaredDifference(halves[0], halves[1], i, c); });
+}
+
+}  // namespace
+
+Rgb<float> meanVariance(const Estimate& e) {
+  if (!e.variance.empty()) return e.variance;
+  Rgb<float> out(e.mean.width(), e.mean.height());
+  if (e.half[0].empty() || e.half[1].empty()) return out;
+  parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t i = begin; i < end; ++i)
+        out[c][i] = finiteFloat(0.25 * squaredDifference(e.half[0], e.half[1], i, c));
+  });
+  return out;
+}
+
+Plane<float> squaredErrorSamples(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance) {
+  return channelMean(halves[0].width(), halves[0].height(), [&](size_t i, size_t c) {
+    const double half = 0.5 * (squaredDifference(halves[0], unbiased.half[1], i, c) +
+                               squaredDifference(halves[1], unbiased.half[0], i, c));
+    return half - 2 * static_cast<double>(variance[c][i]) - 0.25 * squaredDifference(halves[0], halves[1], i, c);
+  });
+}
+
+Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
+                      const Rgb<float>& guide) {
+  const int width = guide.width(), height = guide.height();
+  const Plane<float> samples = squaredErrorSamples(halves, unbiased, variance);
+  const Plane<float> spread = varianceSamples(halves);
+  const Plane<double> level =
+      boxMean(channelMean(width, height, [&](size_t i, size_t c) { return static_cast<double>(guide[c][i]); }), 1);
+  Plane<double> weight(width, height), bias(width, height);
+  parallelChunks(weight.size(), kChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      double v = 0;
+      for (size_t c = 0; c < 3; ++c) v += static_cast<double>(variance[c][i]) / 3;
+      weight[i] = 1 / (level[i] * level[i] + 0.01 + v);
+      bias[i] = weight[i] * (static_cast<double>(samples[i]) - static_cast<double>(spread[i]));
+    }
+  });
+  weight = boxSum(weight, 7);
+  bias = boxSum(bias, 7);
+  const Plane<double> smooth = boxMean(spread, 1);
+  Plane<float> out(width, height);
+  parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i)
+      out[i] = finiteFloat(smooth[i] + std::max(0.0, weight[i] > 0 ? bias[i] / weight[i] : 0.0));
+  });
+  return out;
+}
+
+}  // namespace braid

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+// "js": the James-Stein combiner (Gu et al. 2022; ALGORITHMS 1) without its network: variances are box averages and
+// alpha is 1/2. The unbiased image is pulled, block by block, towards a biased image that was first fitted to it by a
+// crossed half-buffer regression.
+//
+// Halves of the result. With js-regression the half h is JS(X^h, its variance, own fit of half h): the halves share the
+// bandwidth kappa and the variance of all samples, but no pixel values, so that errors can be measured across them.
+// Their mean is not the result, whose Y* is crossed and whose factors come from all samples. Without js-regression half
+// h is JS(X^h, its variance, Y^h). With js-crossed the result is the mean of its halves JS(X^A, Ŷ^B) and JS(X^B, Ŷ^A),
+// which depend on each other: there is no error map then.
+#include <utility>
+
+#include "combiners/error_map.h"
+#include "combiners/finite_float.h"
+#include "combiners/optimised_bias.h"
+#include "combiners/registry.h"
+#include "combiners/shrinkage.h"
+#include "renderer/core/parallel.h"
+
+namespace braid {
+
+namespace {
+
+const OptionInfo kConstant{"js-constant", 1.25,
+                           "Shrinkage relative to the papers' p - 2; below 2, it beats the unbiased image"};
+const OptionInfo kRegression{"js-regression", 1,
+                             "1: fit the biased image to the unbiased one first, 0: use it as it is"};
+const OptionInfo kVariance{"js-variance", 0, "Filter of the variance: 0 box, 1 Gaussian, 2 robust"};
+const OptionInfo kSigma{"js-sigma", 3, "Standard deviation of the Gaussian filter of the variance in pixels"};
+const OptionInfo kCrossed{"js-crossed", 0, "1: combine each half with the fit of the other one, then average"};
+const OptionInfo kGlobal{"js-global", 0, "1: one factor for the whole image"};
+const OptionInfo kPositivePart{"js-positive-part", 1, "0: let factors be negative"};
+const OptionInfo kStride{"js-stride", 4, "Distance of the regression models in pixels"};
+const OptionInfo kGate{"js-gate", 0, "1: replace lone outliers of the unbiased image first"};
+
+bool hasHalves(const Estimate& e) { return !e.half[0].empty() && !e.half[1].empty(); }
+
+// Variance of half h. Both halves together have 4 v, which is shared out by the squares of their values: twice v for
+// halves that agree, all of it for the one that holds an outlier. With 2 v for both, a half would keep 38 % of an
+// outlier of its own that the result is rid of, and errors measured across halves would be those of worse images.
+Rgb<float> halfVariance(const Estimate& x, const Rgb<float>& variance, size_t h) {
+  Rgb<float> out(variance.width(), variance.height());
+  parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t i = begin; i < end; ++i) {
+        const double own = sqr(static_cast<double>(x.half[h][c][i]));
+        const double both = own + sqr(static_cast<double>(x.half[1 - h][c][i]));
+        out[c][i] = finiteFloat(4 * static_cast<double>(variance[c][i]) * (both > 0 ? own / both : 0.5));
+      }
+  });
+  return out;
+}
+
+Rgb<float> average(const Rgb<float>& a, const Rgb<float>& b) {
+  Rgb<float> out = a;
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t i = 0; i < out.size(); ++i) out[c][i] = 0.5f * a[c][i] + 0.5f * b[c][i];
+  return out;
+}
+
+// The images that X, X^A and X^B are pulled towards.
+struct Targets {
+  Rgb<float> mean, half[2], crossed[2];
+};
+
+class JamesStein : public Method {
+ public:
+  const char* name() const override { return "js"; }
+  const char* description() const override {
+    return "James-Stein shrinkage of the unbiased image, in blocks, towards a fit of the biased one";
+  }
+  MethodKind kind() const override { return MethodKind::Combiner; }
+  Needs needs() const override {
+    Needs needs;
+    needs.biased = true;
+    needs.features = true;
+    needs.passes = 4;
+    return needs;
+  }
+  std::vector<OptionInfo> options() const override {
+    return {kConstant, kRegression, kVariance, kSigma, kCrossed, kGlobal, kPositivePart, kStride, kGate};
+  }
+  MethodResult run(const MethodInputs& in) const override;
+};
+
+JamesSteinSettings settingsOf(const MethodOptions& o) {
+  JamesSteinSettings s;
+  s.constant = std::max(0.0, o.number(kConstant));
+  s.filter = o.number(kVariance) >= 2   ? VarianceFilter::Robust
+             : o.number(kVariance) >= 1 ? VarianceFilter::Gaussian
+                                        : VarianceFilter::Box;
+  s.sigma = o.number(kSigma);
+  s.global = o.number(kGlobal) != 0;
+  s.positivePart = o.number(kPositivePart) != 0;
+  s.gate = o.number(kGate) != 0;
+  return s;
+}
+
+Targets targetsOf(const MethodInputs& in, MethodResult& result) {
+  const Estimate &x = *in.unbiased, &y = *in.biased;
+  Targets t;
+  if (!hasHalves(x) || !hasHalves(y) || in.options.number(kRegression) == 0) {
+    t.mean = y.mean;
+    for (int h = 0; h < 2; ++h) t.half[h] = t.crossed[h] = y.half[h];
+    return t;
+  }
+  const RegressionSettings settings =
+      stridedSettings(static_cast<int>(std::clamp(in.options.number(kStride), 1.0, 64.0)), in.cancel);
+  OptimisedBias fit = optimisedBias(x, y, in.features, settings);
+  t.mean = fit.mean();
+  for (int h = 0; h < 2; ++h) {
+    t.half[h] = std::move(fit.own[h]);
+    t.crossed[h] = std::move(fit.crossed[h]);
+  }
+  result.remarks.push_back(fit.report.attribute("js-regression"));
+  return t;
+}
+
+Attribute number(const std::string& name, double value) {
+  Attribute a;
+  a.name = name;
+  a.kind = Attribute::Kind::Float;
+  a.number = value;
+  return a;
+}
+
+MethodResult JamesStein::run(const MethodInputs& in) const {
+  const Estimate &x = *in.unbiased, &y = *in.biased;
+  MethodResult result;
+  Estimate& out = result.image;
+  out.unbiased = false;
+  out.passes = x.passes;
+  if (x.passes == 1) {  // nothing is known of the noise
+    out.mean = y.mean;
+    for (int h = 0; h < 2; ++h) out.half[h] = y.half[h];
+    return result;
+  }
+  const JamesSteinSettings settings = settingsOf(in.options);
+  const bool halves = hasHalves(x) && hasHalves(y), crossed = halves && in.options.number(kCrossed) != 0;
+  const Rgb<float> variance = meanVariance(x);
+  const Targets targets = targetsOf(in, result);
+  ShrunkImage shrunk[2];
+  for (int h = 0; halves && h < 2; ++h) {
+    shrunk[h] = jamesStein(x.half[h], halfVariance(x, variance, static_cast<size_t>(h)),
+                           crossed ? targets.crossed[1 - h] : targets.half[h], settings);
+    out.half[h] = shrunk[h].image;
+  }
+  ShrunkImage full = crossed
+                         ? ShrunkImage{average(out.half[0], out.half[1]), average(shrunk[0].factor, shrunk[1].factor)}
+                         : jamesStein(x.mean, variance, targets.mean, settings);
+  out.mean = std::move(full.image);
+  if (halves && !crossed) result.error = errorMap(out.half, x, variance, y.mean);
+  const char* const channels[3] = {"R", "G", "B"};
+  for (size_t c = 0; c < 3; ++c)
+    result.aovs.push_back({std::string("shrinkage.js.") + channels[c], std::move(full.factor[c])});
+  result.remarks.push_back(number(kConstant.name, settings.constant));
+  return result;
+}
+
+}  // namespace
+
+std::unique_ptr<Method> make_js() { return std::make_unique<JamesStein>(); }
+
+}  // namespace braid

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Windows that are mirrored at the borders of the image without repeating the edge, as the James-Stein combiner wants
+// them: every block has the same number of pixels, and mirrored ones count twice (ALGORITHMS 0 and 1.1).
+#pragma once
+
+#include "renderer/film/box_sum.h"
+
+namespace braid {
+
+// i for 0 <= i < size; -i below, 2 size - 2 - i above, again and again for images smaller than the window.
+inline int mirrorIndex(int i, int size) {
+  if (size == 1) return 0;
+  const int period = 2 * (size - 1);
+  const int m = ((i % period) + period) % period;
+  return m < size ? m : period - m;
+}
+
+// The plane with `radius` mirrored pixels around it.
+template <class T>
+Plane<T> mirrorPadded(const Plane<T>& in, int radius) {
+  Plane<T> out(in.width + 2 * radius, in.height + 2 * radius);
+  parallelRows(out.height, [&](int y) {
+    const T* from = in.data.data() + in.index(0, mirrorIndex(y - radius, in.height));
+    T* to = out.data.data() + out.index(0, y);
+    for (int x = 0; x < radius; ++x) to[x] = from[mirrorIndex(x - radius, in.width)];
+    for (int x = 0; x < in.width; ++x) to[radius + x] = from[x];
+    for (int x = radius + in.width; x < out.width; ++x) to[x] = from[mirrorIndex(x - radius, in.width)];
+  });
+  return out;
+}
+
+// Means over windows of (2 radius + 1)² pixels.
+template <class T>
+Plane<double> mirrorBoxMean(const Plane<T>& in, int radius) {
+  const Plane<double> sums = boxSum(mirrorPadded(in, radius), radius);
+  Plane<double> out(in.width, in.height);
+  const double scale = 1.0 / ((2.0 * radius + 1) * (2.0 * radius + 1));
+  parallelRows(in.height, [&](int y) {
+    for (int x = 0; x < in.width; ++x) out.at(x, y) = sums.at(x + radius, y + radius) * scale;
+  });
+  return out;
+}
+
+}  // namespace braid

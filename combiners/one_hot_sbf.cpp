@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// One base a pixel, by estimated errors that a cross bilateral filter over the features has smoothed
+// (combiners/one_hot.h).
+#include "combiners/denoise/variance.h"
+#include "combiners/one_hot.h"
+#include "combiners/registry.h"
+
+namespace braid {
+
+namespace {
+
+class OneHotSbf : public Method {
+ public:
+  const char* name() const override { return "one-hot-sbf"; }
+  const char* description() const override { return "One base a pixel, by errors smoothed along the features"; }
+  MethodKind kind() const override { return MethodKind::Combiner; }
+  Needs needs() const override {
+    Needs needs = oneHotNeeds();
+    needs.features = true;
+    return needs;
+  }
+
+  MethodResult run(const MethodInputs& in) const override {
+    const auto errors = featureFiltered(baseErrors(*in.unbiased, in.bases), in.features, passesOf(*in.unbiased));
+    return oneHotResult(in, selectionMaps(errors), name());
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Method> make_one_hot_sbf() { return std::make_unique<OneHotSbf>(); }
+
+}  // namespace braid

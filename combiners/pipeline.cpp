@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combiners/pipeline.h"
+
+#include <chrono>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "renderer/core/error.h"
+#include "renderer/core/parallel.h"
+
+namespace braid {
+
+namespace {
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void addDifference(Rgb<float>& to, const Rgb<float>& a, const Rgb<float>& b) {
+  if (to.empty()) return;
+  for (size_t c = 0; c < 3; ++c)
+    parallelChunks(to[c].size(), 4096, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) to[c][i] += a[c][i] - b[c][i];
+    });
+}
+
+// The estimate with another mean; halves and quarters move with it.
+Estimate withMean(const Estimate& e, const Rgb<float>& mean) {
+  Estimate moved = e;
+  for (Rgb<float>& half : moved.half) addDifference(half, mean, e.mean);
+  for (Rgb<float>& quarter : moved.quarter) addDifference(quarter, mean, e.mean);
+  moved.mean = mean;
+  return moved;
+}
+
+bool sizeIs(const Rgb<float>& image, const Estimates& e) {
+  return image.empty() || (image.width() == e.width && image.height() == e.height);
+}
+
+void checkSizes(const Estimates& all) {
+  for (const Estimate& e : all.estimates) {
+    bool ok = !e.mean.empty() && sizeIs(e.variance, all) && sizeIs(e.bias, all) && sizeIs(e.biasVariance, all);
+    for (const Rgb<float>* image : {&e.mean, &e.half[0], &e.half[1]}) ok = ok && sizeIs(*image, all);
+    for (const Rgb<float>& q : e.quarter) ok = ok && sizeIs(q, all);
+    if (!ok)
+      throw Error(ExitCode::BadInput, fmt::format("the planes of the estimate {} are not all of the size {}x{}", e.name,
+                                                  all.width, all.height));
+  }
+}
+
+class Runner {
+ public:
+  Runner(const Estimates& estimates, const PipelineOptions& options) : all_(estimates), options_(options) {}
+
+  void normalise(const std::string& unbiased);
+  void run(Step step);
+  // Back to the units of the estimates.
+  void finish();
+
+  PipelineResult result;
+
+ private:
+  const Estimate* estimate(const std::string& name) const;
+  MethodInputs inputsOf(const Step& step) const;
+  std::string missingInput(const Step& step) const;
+  double inputSeconds(const Step& step) const;
+
+  Estimates all_;  // sanitised and normalised; so are the results until finish()
+  const PipelineOptions& options_;
+};
+
+void Runner::normalise(const std::string& unbiased) {
+  result.sanitised = sanitise(all_);
+  const Estimate* e = all_.find(unbiased);
+  result.exposure = options_.exposure > 0 ? options_.exposure : e ? exposureScale(e->mean) : 1.0;
+  scaleExposure(all_, result.exposure);
+  result.sanitised.outOfRange = limitRange(all_);
+}
+
+const Estimate* Runner::estimate(const std::string& name) const {
+  if (name.empty()) return nullptr;
+  if (const PipelineOutput* made = result.find(name)) return made->ran() ? &made->result.image : nullptr;
+  return all_.find(name);
+}
+
+// What a method made may lack halves that the recipe could not know of, or may have failed.
+std::string Runner::missingInput(const Step& step) const {
+  std::vector<std::string> names = step.bases;
+  if (!step.biased.empty()) names.push_back(step.biased);
+  for (const std::string& name : names) {
+    const PipelineOutput* made = result.find(name);
+    if (made && !made->ran()) return fmt::format("needs {}, which did not run: {}", name, made->step.obstacle);
+    const Estimate* e = estimate(name);
+    if (!e) return fmt::format("needs {}, which there is not", name);
+    if (step.method->needs().halves && (e->half[0].empty() || e->half[1].empty()))
+      return fmt::format("needs the halves of {}", name);
+  }
+  return {};
+}
+
+MethodInputs Runner::inputsOf(const Step& step) const {
+  MethodInputs in;
+  in.unbiased = estimate(step.unbiased);
+  in.biased = estimate(step.biased);
+  in.correlated = estimate(step.correlated);
+  for (const std::string& base : step.bases) in.bases.push_back(estimate(base));
+  in.features = all_.features ? &*all_.features : nullptr;
+  const auto history = all_.history.find(step.unbiased);
+  in.history = history == all_.history.end() ? nullptr : &history->second;
+  in.seed = all_.seed;
+  in.options = options_.numbers;
+  in.options.set(kPipelineExposure.name, result.exposure);
+  in.cancel = options_.cancel;
+  const PipelineOutput* maker = result.find(step.biased);
+  if (maker && maker->step.method->kind() == MethodKind::Denoiser) {
+    const MethodInputs again = inputsOf(maker->step);
+    in.redenoise = [again, method = maker->step.method](const Rgb<float>& image) {
+      const Estimate moved = withMean(*again.unbiased, image);
+      MethodInputs other = again;
+      other.unbiased = &moved;
+      return method->run(other).image.mean;
+    };
+  }
+  return in;
+}
+
+double Runner::inputSeconds(const Step& step) const {
+  std::set<std::string> seen;
+  double seconds = 0;
+  const auto visit = [&](const auto& self, const Step& s) -> void {
+    std::vector<std::string> names = s.bases;
+    names.push_back(s.biased);
+    for (const std::string& name : names) {
+      const PipelineOutput* made = result.find(name);
+      if (!made || !seen.insert(name).second) continue;
+      seconds += made->seconds;
+      self(self, made->step);
+    }
+  };
+  visit(visit, step);
+  return seconds;
+}
+
+void Runner::run(Step step) {
+  PipelineOutput out;
+  if (step.obstacle.empty()) step.obstacle = missingInput(step);
+  if (step.obstacle.empty()) {
+    const auto start = std::chrono::steady_clock::now();
+    try {
+      out.result = step.method->run(inputsOf(step));
+    } catch (const Error& e) {
+      step.obstacle = e.what();
+    }
+    out.seconds = secondsSince(start);
+    out.inputSeconds = inputSeconds(step);
+    const Estimate* unbiased = estimate(step.unbiased);
+    Estimate& image = out.result.image;
+    image.name = step.name;
+    image.unbiased = false;
+    image.passes = unbiased ? unbiased->passes : 0;
+    image.seconds = out.seconds;
+    if (step.obstacle.empty() && (image.mean.width() != all_.width || image.mean.height() != all_.height))
+      step.obstacle = fmt::format("its image has {}x{} pixels instead of {}x{}", image.mean.width(),
+                                  image.mean.height(), all_.width, all_.height);
+  }
+  out.step = std::move(step);
+  result.outputs.push_back(std::move(out));
+}
+
+void Runner::finish() {
+  for (PipelineOutput& out : result.outputs) scaleExposure(out.result, 1 / result.exposure);
+}
+
+Attribute textAttribute(const std::string& name, const std::string& value) {
+  Attribute a;
+  a.name = name;
+  a.text = value;
+  return a;
+}
+
+}  // namespace
+
+const PipelineOutput* PipelineResult::find(const std::string& name) const {
+  for (const PipelineOutput& out : outputs)
+    if (out.step.name == name) return &out;
+  return nullptr;
+}
+
+PipelineResult runPipeline(const Estimates& estimates, const std::vector<std::string>& wanted,
+                           const PipelineOptions& options) {
+  checkSizes(estimates);
+  const Recipe recipe = makeRecipe(factsOf(estimates), wanted, options.roles);
+  Runner runner(estimates, options);
+  std::string unbiased;
+  for (const Step& step : recipe.steps)
+    if (unbiased.empty()) unbiased = step.unbiased;
+  runner.normalise(unbiased);
+  for (const Step& step : recipe.steps) runner.run(step);
+  runner.finish();
+  return std::move(runner.result);
+}
+
+std::vector<Attribute> remarksOf(const PipelineOutput& output, bool timing) {
+  const std::string prefix = "braid/" + layerName(output.step.name) + "/";
+  std::vector<Attribute> list;
+  const auto input = [&](const char* role, const std::string& name) {
+    if (!name.empty()) list.push_back(textAttribute(prefix + role, name));
+  };
+  input("unbiased", output.step.unbiased);
+  input("biased", output.step.biased);
+  input("correlated", output.step.correlated);
+  std::string bases;
+  for (const std::string& base : output.step.bases) bases += (bases.empty() ? "" : ", ") + base;
+  input("bases", bases);
+  for (Attribute remark : output.result.remarks) {
+    remark.name = prefix + remark.name;
+    list.push_back(remark);
+  }
+  if (timing)
+    for (const auto& [name, value] : {std::pair("seconds", output.seconds), {"inputSeconds", output.inputSeconds}}) {
+      Attribute a;
+      a.name = prefix + name;
+      a.kind = Attribute::Kind::Float;
+      a.number = value;
+      list.push_back(a);
+    }
+  return list;
+}
+
+}  // namespace braid

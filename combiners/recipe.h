@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// Decides, from what there is, which denoisers and combiners run on what and in which order: a pure function that a
+// plan prints before a render and that the pipeline executes after it. What cannot run says why in one sentence.
+//
+// A method is named by its name in the registry. Two forms add to it:
+//   name:parameter   a method that takes a parameter, such as external:FILE; the rest of the text is the parameter
+//   name@biased      the method with this biased input instead of the default one, such as js@ensemble; the input may
+//                    itself have an input: js@easy@nfor
+//
+// Names of methods go before names of estimates: an image that a file holds from an earlier run of a method is not used
+// under that method's name.
+//
+// How the roles are filled:
+//   unbiased    as named, or the first estimate that is unbiased and whose pixels are independent.
+//   correlated  as named, or the first estimate that is unbiased and whose pixels are correlated.
+//   biased      after '@', or as named for all; or else the first denoiser asked for; or else the first biased
+//               estimate, but not for methods that run the denoiser again (SURE); or else the first that runs of oidn,
+//               nfor, rdfc, pw, nlm; or else the first other denoiser that runs. Never box, which is input for stress
+//               tests. The named input itself gets the default one when it needs a biased input.
+//   bases       as named, or the denoisers asked for when they are enough, or else all denoisers that run but box.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "renderer/film/combiner.h"
+
+namespace braid {
+
+// The choices of a user; empty: by the rules above.
+struct RecipeOptions {
+  std::string unbiased, correlated, biased;
+  std::vector<std::string> bases;
+  std::vector<std::string> denoisers;  // asked for, in this order
+};
+
+// What is known of an estimate without its pixels.
+struct EstimateFacts {
+  std::string name;
+  bool unbiased = true;
+  Correlation correlation = Correlation::Independent;
+  uint64_t passes = 0;  // 0: not known
+  bool halves = true, variance = true, quarters = false;
+  int checkpoints = 0;
+};
+
+struct Facts {
+  std::vector<EstimateFacts> estimates;
+  bool features = false;
+  const EstimateFacts* find(const std::string& name) const;
+};
+Facts factsOf(const Estimates& estimates);
+
+// One method and its inputs, by name; empty: not used.
+struct Step {
+  std::string name;
+  std::shared_ptr<const Method> method;
+  std::string unbiased, biased, correlated;
+  std::vector<std::string> bases;
+  std::string obstacle;  // why it cannot run, in one sentence; empty: it can
+};
+
+struct Recipe {
+  std::vector<Step> steps;  // inputs before the methods that read them
+  const Step* find(const std::string& name) const;
+};
+
+// The steps for the wanted methods and everything that they need. Throws Error(Usage) naming an unknown method and
+// those that exist.
+Recipe makeRecipe(const Facts& facts, const std::vector<std::string>& wanted, const RecipeOptions& options);
+
+// What a render must keep for the steps that can run.
+struct RecipeNeeds {
+  bool quarters = false, features = false;
+  int checkpoints = 0;
+};
+RecipeNeeds needsOf(const Recipe& recipe);
+
+// Whether a method of exactly this name is registered.
+bool isMethod(const std::string& name);
+
+// The method that a name stands for, without its '@' part. Throws Error(Usage) naming those that exist.
+std::shared_ptr<const Method> findMethod(const std::string& name);
+
+// The options of every registered method, each once.
+std::vector<OptionInfo> allMethodOptions();
+
+// A name for layers of files: what follows a colon is shortened to the stem of a file name, and no dots.
+std::string layerName(const std::string& name);
+
+}  // namespace braid

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combiners/shrinkage.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "combiners/finite_float.h"
+#include "combiners/mirror.h"
+
+namespace braid {
+
+namespace {
+
+constexpr double kLeastSum = 1e-5;        // released code
+constexpr double kRelativeLeast = 1e-12;  // of a squared difference, relative to x²: below it is rounding
+constexpr size_t kChunk = 4096;
+
+template <class Body>
+void forAll(size_t count, const Body& body) {
+  parallelChunks(count, kChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) body(i);
+  });
+}
+
+// Combines values of the mirrored window along x, then along y, one by one.
+template <class Combine>
+Plane<double> separable(const Plane<double>& in, int radius, const Combine& combine) {
+  Plane<double> rows(in.width, in.height), out(in.width, in.height);
+  parallelRows(in.height, [&](int y) {
+    for (int x = 0; x < in.width; ++x) {
+      double sum = 0;
+      for (int d = -radius; d <= radius; ++d) sum = combine(sum, in.at(mirrorIndex(x + d, in.width), y), d);
+      rows.at(x, y) = sum;
+    }
+  });
+  parallelRows(in.height, [&](int y) {
+    for (int x = 0; x < in.width; ++x) {
+      double sum = 0;
+      for (int d = -radius; d <= radius; ++d) sum = combine(sum, rows.at(x, mirrorIndex(y + d, in.height)), d);
+      out.at(x, y) = sum;
+    }
+  });
+  return out;
+}
+
+Plane<double> gaussianMean(const Plane<double>& in, int radius, double sigma) {
+  std::vector<double> weights(static_cast<size_t>(2 * radius + 1));
+  double total = 0;
+  for (int d = -radius; d <= radius; ++d)
+    total += weights[static_cast<size_t>(d + radius)] = std::exp(-d * d / (2 * sigma * sigma));
+  return separable(in, radius, [&](double sum, double value, int d) {
+    return sum + value * weights[static_cast<size_t>(d + radius)] / total;
+  });
+}
+
+// What is subtracted from SSE, before the constant: (p - 2) sigma², or its robust counterpart.
+Plane<double> numerators(const Plane<double>& variance, const JamesSteinSettings& s) {
+  const double p = (2.0 * s.radius + 1) * (2.0 * s.radius + 1);
+  Plane<double> out = s.filter == VarianceFilter::Gaussian ? gaussianMean(variance, s.radius, std::max(s.sigma, 1e-3))
+                                                           : mirrorBoxMean(variance, s.radius);
+  if (s.filter != VarianceFilter::Robust) {
+    forAll(out.size(), [&](size_t i) { out[i] *= p - 2; });
+    return out;
+  }
+  const Plane<double> most =
+      separable(variance, s.radius, [](double sum, double value, int) { return std::max(sum, value); });
+  forAll(out.size(), [&](size_t i) { out[i] = std::max(0.0, p * out[i] - 2 * most[i]); });
+  return out;
+}
+
+double total(const Plane<double>& in) {
+  return parallelSum(in.size(), kChunk, 0.0, [&](size_t begin, size_t end) {
+    double sum = 0;
+    for (size_t i = begin; i < end; ++i) sum += in[i];
+    return sum;
+  });
+}
+
+// The mean factor of every pixel of one channel.
+Plane<double> factors(const Plane<double>& squares, const Plane<double>& variance, const JamesSteinSettings& s) {
+  if (s.global) {
+    const auto n = static_cast<double>(squares.size());
+    const double numerator = s.constant * std::max(0.0, n - 2) / n * total(variance);
+    return {squares.width, squares.height, shrinkageFactor(numerator, total(squares), s.positivePart)};
+  }
+  const double p = (2.0 * s.radius + 1) * (2.0 * s.radius + 1);
+  const Plane<double> numerator = numerators(variance, s);
+  Plane<double> factor = mirrorBoxMean(squares, s.radius);
+  forAll(factor.size(),
+         [&](size_t i) { factor[i] = shrinkageFactor(s.constant * numerator[i], p * factor[i], s.positivePart); });
+  return mirrorBoxMean(factor, s.radius);
+}
+
+// Pixels whose standard deviation is beyond 5 times that of their surroundings although X and Y differ by less than 4
+// of them: one sample carries them, and X says nothing that Y would contradict.
+std::vector<char> gated(const Rgb<float>& x, const Rgb<float>& variance, const Rgb<float>& y, int radius) {
+  Plane<double> deviation(x.width(), x.height());
+  forAll(x.size(), [&](size_t i) {
+    double v = 0;
+    for (size_t c = 0; c < 3; ++c) v += static_cast<double>(variance[c][i]) / 3;
+    deviation[i] = std::sqrt(v);
+  });
+  const Plane<double> around = mirrorBoxMean(deviation, radius);
+  std::vector<char> gate(x.size());
+  forAll(x.size(), [&](size_t i) {
+    double square = 0;
+    for (size_t c = 0; c < 3; ++c) {
+      const double d = static_cast<double>(x[c][i]) - static_cast<double>(y[c][i]);
+      square += d * d / 3;
+    }
+    gate[i] = deviation[i] > 5 * around[i] && std::sqrt(square) < 4 * deviation[i];
+  });
+  return gate;
+}
+
+}  // namespace
+
+double shrinkageFactor(double numerator, double sumOfSquares, bool positivePart) {
+  const double factor = 1 - numerator / std::max(sumOfSquares, kLeastSum);
+  if (!std::isfinite(factor)) return 0;
+  return positivePart ? std::max(0.0, factor) : factor;
+}
+
+ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rgb<float>& y,
+                       const JamesSteinSettings& settings) {
+  const int width = x.width(), height = x.height();
+  ShrunkImage out{Rgb<float>(width, height), Rgb<float>(width, height)};
+  const std::vector<char> gate =
+      settings.gate ? gated(x, variance, y, settings.radius) : std::vector<char>(x.size(), char{0});
+  for (size_t c = 0; c < 3; ++c) {
+    Plane<double> squares(width, height), noise(width, height);
+    forAll(x.size(), [&](size_t i) {
+      const auto value = static_cast<double>(x[c][i]), difference = value - static_cast<double>(y[c][i]);
+      squares[i] = gate[i] ? 0.0 : std::max(difference * difference, kRelativeLeast * value * value);
+      noise[i] = gate[i] ? 0.0 : static_cast<double>(variance[c][i]);
+    });
+    const Plane<double> factor = factors(squares, noise, settings);
+    forAll(x.size(), [&](size_t i) {
+      const auto other = static_cast<double>(y[c][i]);
+      const double rho = gate[i] ? 0.0 : factor[i];
+      out.image[c][i] = finiteFloat(std::max(0.0, other + rho * (static_cast<double>(x[c][i]) - other)));
+      out.factor[c][i] = finiteFloat(rho);
+    });
+  }
+  return out;
+}
+
+}  // namespace braid

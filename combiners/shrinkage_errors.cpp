@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include "combiners/box_mean.h"
+#include "combiners/double_shrinkage.h"
+#include "combiners/error_map.h"
+#include "combiners/finite_float.h"
+#include "combiners/joint_filter.h"
+
+namespace braid {
+
+namespace {
+
+constexpr int kRadius = 6;
+constexpr double kWinsorise = 8;
+
+// map(i, c) averaged over channels.
+template <class Map>
+Plane<float> channelMean(const Rgb<float>& like, const Map& map) {
+  Plane<float> out(like.width(), like.height());
+  parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i)
+      out[i] = finiteFloat((map(i, size_t(0)) + map(i, size_t(1)) + map(i, size_t(2))) / 3);
+  });
+  return out;
+}
+
+double at(const Rgb<float>& image, size_t i, size_t c) { return static_cast<double>(image[c][i]); }
+
+// error := max(error, scale (m² + offset)), m the channel mean of the image.
+void raise(Plane<float>& error, const Rgb<float>& image, double scale, double offset) {
+  parallelChunks(error.size(), 4096, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      const double m = (at(image, i, 0) + at(image, i, 1) + at(image, i, 2)) / 3;
+      error[i] = finiteFloat(std::max(static_cast<double>(error[i]), scale * (m * m + offset)));
+    }
+  });
+}
+
+Plane<float> boxed(const Plane<float>& in) {
+  const Plane<double> mean = boxMean(in, kRadius);
+  Plane<float> out(in.width, in.height);
+  for (size_t i = 0; i < out.size(); ++i) out[i] = finiteFloat(mean[i]);
+  return out;
+}
+
+// Means of non-negative values over the window without the largest of them.
+Plane<double> trimmedMean(const Plane<float>& in) {
+  Plane<float> rows(in.width, in.height);
+  parallelRows(in.height, [&](int y) {
+    for (int x = 0; x < in.width; ++x)
+      for (int i = std::max(0, x - kRadius); i <= std::min(in.width - 1, x + kRadius); ++i)
+        rows.at(x, y) = std::max(rows.at(x, y), in.at(i, y));
+  });
+  Plane<double> out = boxSum(in, kRadius);
+  parallelRows(in.height, [&](int y) {
+    const int first = std::max(0, y - kRadius), last = std::min(in.height - 1, y + kRadius);
+    for (int x = 0; x < in.width; ++x) {
+      float largest = 0;
+      for (int j = first; j <= last; ++j) largest = std::max(largest, rows.at(x, j));
+      const int columns = std::min(in.width - 1, x + kRadius) - std::max(0, x - kRadius) + 1;
+      const int others = std::max(1, columns * (last - first + 1) - 1);
+      out.at(x, y) = std::max(0.0, out.at(x, y) - static_cast<double>(largest)) / others;
+    }
+  });
+  return out;
+}
+
+bool hasHalves(const Estimate& e) { return !e.half[0].empty() && !e.half[1].empty(); }
+
+}  // namespace
+
+DoubleShrinkage doubleShrinkage(double unbiasedError, double biasedError, double priorError) {
+  DoubleShrinkage s;
+  const double sum = unbiasedError + biasedError;
+  s.toBiased = std::isinf(unbiasedError) ? 1.0 : sum > 0 ? unbiasedError / sum : 0.0;
+  const double h = std::isinf(unbiasedError) ? biasedError : s.toBiased * biasedError;
+  const double harmonic = std::isinf(biasedError) ? unbiasedError : h;
+  s.toPrior = std::isinf(priorError) ? 0.0 : harmonic + priorError > 0 ? harmonic / (harmonic + priorError) : 0.0;
+  s.variance = std::isinf(priorError) ? harmonic : s.toPrior * priorError;
+  return s;
+}
+
+Plane<float> unbiasedError(const Estimate& unbiased, const Rgb<float>& variance) {
+  Plane<float> error = boxed(channelMean(variance, [&](size_t i, size_t c) { return at(variance, i, c); }));
+  raise(error, unbiased.mean, 1e-8, 1e-4);
+  return error;
+}
+
+Plane<float> biasedError(const Estimate& biased, const Estimate& unbiased, const Rgb<float>& variance,
+                         const Features* features) {
+  Plane<float> error;
+  if (!biased.bias.empty()) {
+    const Rgb<float> noise = meanVariance(biased);
+    const Plane<float> spread = channelMean(noise, [&](size_t i, size_t c) { return at(noise, i, c); });
+    const Plane<float> squaredBias = channelMean(noise, [&](size_t i, size_t c) {
+      const double spare = biased.biasVariance.empty() ? 0.0 : at(biased.biasVariance, i, c);
+      return at(biased.bias, i, c) * at(biased.bias, i, c) - spare;
+    });
+    const std::vector<Plane<float>> smooth = jointFilter({&spread, &squaredBias}, features, kRadius);
+    error = smooth[0];
+    for (size_t i = 0; i < error.size(); ++i) error[i] += std::max(0.0f, smooth[1][i]);
+  } else {
+    const Plane<float> samples = hasHalves(biased) && hasHalves(unbiased)
+                                     ? squaredErrorSamples(biased.half, unbiased, variance)
+                                     : channelMean(variance, [&](size_t i, size_t c) {
+                                         const double d = at(biased.mean, i, c) - at(unbiased.mean, i, c);
+                                         return d * d - at(variance, i, c);
+                                       });
+    error = std::move(jointFilter({&samples}, features, kRadius)[0]);
+  }
+  raise(error, biased.mean, 1e-8, 1e-4);
+  return error;
+}
+
+Plane<float> priorError(const Rgb<float>& prior, const Rgb<float> (&halves)[2], const Estimate& unbiased,
+                        const Rgb<float>& variance, const Plane<float>& unbiasedError) {
+  const auto across = [&](size_t i, size_t c, double limit) {
+    const auto square = [limit](double d) { return std::min(d * d, limit); };
+    return 0.5 * (square(at(halves[0], i, c) - at(unbiased.half[1], i, c)) +
+                  square(at(halves[1], i, c) - at(unbiased.half[0], i, c)));
+  };
+  const Plane<double> around =
+      trimmedMean(channelMean(prior, [&](size_t i, size_t c) { return across(i, c, HUGE_VAL); }));
+  const Plane<float> samples = channelMean(prior, [&](size_t i, size_t c) {
+    const double limit = kWinsorise * kWinsorise * std::max(2 * static_cast<double>(unbiasedError[i]), around[i]);
+    const double between = at(halves[0], i, c) - at(halves[1], i, c);
+    return across(i, c, limit) - 2 * at(variance, i, c) - 0.25 * between * between;
+  });
+  Plane<float> error = boxed(samples);
+  raise(error, prior, 1e-6, 1e-2);
+  return error;
+}
+
+}  // namespace braid

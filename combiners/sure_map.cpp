@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combiners/sure_map.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "renderer/core/hash.h"
+#include "renderer/core/parallel.h"
+
+namespace braid {
+
+namespace {
+
+constexpr size_t kChunk = 4096;
+constexpr int kRadius = 5;
+constexpr double kTrimmed = 0.001;
+
+// A standard normal variate by Box and Muller.
+double normalVariate(uint64_t seed, uint64_t item) {
+  const uint64_t a = hashCombine(seed, 2 * item), b = hashCombine(seed, 2 * item + 1);
+  const double u = (static_cast<double>(a >> 11) + 0.5) * 0x1p-53, v = static_cast<double>(b >> 11) * 0x1p-53;
+  return std::sqrt(-2 * std::log(u)) * std::cos(2 * static_cast<double>(kPi) * v);
+}
+
+template <class Body>
+void forAllValues(const Rgb<float>& image, const Body& body) {
+  for (size_t c = 0; c < 3; ++c)
+    parallelChunks(image.size(), kChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) body(c, i);
+    });
+}
+
+double meanOf(const Plane<float>& plane) {
+  const double sum = parallelSum<double>(plane.size(), kChunk, 0, [&](size_t begin, size_t end) {
+    double part = 0;
+    for (size_t i = begin; i < end; ++i) part += static_cast<double>(plane[i]);
+    return part;
+  });
+  return plane.empty() ? 0 : sum / static_cast<double>(plane.size());
+}
+
+}  // namespace
+
+Rgb<float> sureMap(const Rgb<float>& noisy, const Rgb<float>& denoised, const Rgb<float>& variance, uint64_t seed,
+                   double step, const std::function<Rgb<float>(const Rgb<float>&)>& denoise) {
+  const int width = noisy.width(), height = noisy.height();
+  Rgb<float> b(width, height), moved[2] = {{width, height}, {width, height}};
+  forAllValues(noisy, [&](size_t c, size_t i) {
+    const double deviation = std::sqrt(std::max(0.0, static_cast<double>(variance[c][i])));
+    b[c][i] = static_cast<float>(deviation * normalVariate(seed, 3 * static_cast<uint64_t>(i) + c));
+    moved[0][c][i] = noisy[c][i] + static_cast<float>(step) * b[c][i];
+    moved[1][c][i] = noisy[c][i] - static_cast<float>(step) * b[c][i];
+  });
+  for (Rgb<float>& image : moved) image = denoise(image);
+  Rgb<float> out(width, height);
+  forAllValues(noisy, [&](size_t c, size_t i) {
+    const double difference = static_cast<double>(denoised[c][i]) - static_cast<double>(noisy[c][i]);
+    const double change = static_cast<double>(moved[0][c][i]) - static_cast<double>(moved[1][c][i]);
+    const double divergence = static_cast<double>(b[c][i]) * change / step;
+    out[c][i] = static_cast<float>(difference * difference - static_cast<double>(variance[c][i]) + divergence);
+  });
+  return out;
+}
+
+double mapFilterSigma(const Rgb<float>& variance) {
+  std::vector<float> values;
+  for (const Plane<float>& p : variance.channel) values.insert(values.end(), p.data.begin(), p.data.end());
+  if (values.empty()) return 0.1;
+  const auto kept = values.size() - static_cast<size_t>(kTrimmed * static_cast<double>(values.size()));
+  std::sort(values.begin(), values.end());
+  double sum = 0;
+  for (size_t i = 0; i < kept; ++i) sum += static_cast<double>(values[i]);
+  return 100 * std::clamp(std::sqrt(sum / static_cast<double>(kept)), 1e-3, 1.0);
+}
+
+Rgb<float> gaussianFiltered(const Rgb<float>& in, double sigma) {
+  std::array<double, 2 * kRadius + 1> weight;
+  double total = 0;
+  for (int d = -kRadius; d <= kRadius; ++d)
+    total += weight[static_cast<size_t>(d + kRadius)] = std::exp(-0.5 * d * d / (sigma * sigma));
+  for (double& w : weight) w /= total;
+
+  const int width = in.width(), height = in.height();
+  const auto filtered = [&](const auto& from, auto& to, int dx, int dy) {
+    parallelRows(height, [&](int y) {
+      for (int x = 0; x < width; ++x) {
+        double sum = 0;
+        for (int d = -kRadius; d <= kRadius; ++d)
+          sum +=
+              weight[static_cast<size_t>(d + kRadius)] *
+              static_cast<double>(from.at(std::clamp(x + d * dx, 0, width - 1), std::clamp(y + d * dy, 0, height - 1)));
+        to.at(x, y) = static_cast<std::decay_t<decltype(to.at(x, y))>>(sum);
+      }
+    });
+  };
+  Rgb<float> out(width, height);
+  Plane<double> rows(width, height);
+  for (size_t c = 0; c < 3; ++c) {
+    filtered(in[c], rows, 1, 0);
+    filtered(rows, out[c], 0, 1);
+  }
+  return out;
+}
+
+void applySignRule(Rgb<float>& filtered, const Rgb<float>& unfiltered, const Rgb<float>& variance) {
+  for (size_t c = 0; c < 3; ++c) {
+    const bool helps = meanOf(variance[c]) > meanOf(unfiltered[c]);
+    parallelChunks(filtered[c].size(), kChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i)
+        filtered[c][i] = helps ? std::max(0.0f, filtered[c][i]) : std::fabs(filtered[c][i]);
+    });
+  }
+}
+
+}  // namespace braid

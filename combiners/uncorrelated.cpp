@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Input-dependent uncorrelated weighting: an unbiased image of independent pixels and an unbiased image of correlated
+// ones, whose differences are better than its pixels, make one with less noise and hardly any bias
+// (combiners/uncorrelated_filter.h has the formula).
+//
+// gamma is the candidate whose results differ least between two halves of the samples. The image itself takes its
+// weights from the two halves of the correlated image. Where the correlated image was reconstructed from the samples of
+// the independent one (gradients), each half of the one is combined with the other half of the other instead, and the
+// results are averaged.
+#include "combiners/registry.h"
+#include "combiners/uncorrelated_groups.h"
+
+namespace braid {
+
+namespace {
+
+const OptionInfo kGamma{"uncorrelated-gamma", -1, "Sensitivity of the weights to noise; negative: chosen by variance"};
+
+class Uncorrelated : public Method {
+ public:
+  const char* name() const override { return "uncorrelated"; }
+  const char* description() const override {
+    return "Independent and correlated image with input-dependent weights, nearly unbiased";
+  }
+  MethodKind kind() const override { return MethodKind::Combiner; }
+  Needs needs() const override {
+    Needs needs;
+    needs.correlated = needs.quarters = true;
+    needs.passes = 4;
+    needs.variance = false;
+    return needs;
+  }
+  std::vector<OptionInfo> options() const override { return {kGamma}; }
+  MethodResult run(const MethodInputs& in) const override;
+};
+
+MethodResult Uncorrelated::run(const MethodInputs& in) const {
+  const Estimate &y = *in.unbiased, &z = *in.correlated;
+  // Halves of images that share samples are crossed: half A of y meets half B of z, whose quarters make the weights.
+  const size_t swap = z.correlation == Correlation::Gradients ? 1 : 0;
+  const UncorrelatedInputs groups[2] = {uncorrelatedGroup(y, z, 0, swap, swap),
+                                        uncorrelatedGroup(y, z, 1, 1 - swap, 1 - swap)};
+  const double gamma = chosenGamma(in, kGamma, groups);
+  MethodResult result;
+  Estimate& out = result.image;
+  for (int h = 0; h < 2; ++h) out.half[h] = uncorrelatedFiltered(groups[h], gamma);
+  if (swap) {
+    out.mean = out.half[0];
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t i = 0; i < out.mean.size(); ++i) out.mean[c][i] = 0.5f * (out.mean[c][i] + out.half[1][c][i]);
+    // Both have seen all samples: no halves that are independent of each other, and no error from their difference.
+    out.half[0] = out.half[1] = {};
+  } else {
+    const double samples = static_cast<double>(passesOf(z)) / 2;
+    out.mean = uncorrelatedFiltered({&y.mean, &z.mean, &z.half[0], &z.half[1], samples}, gamma);
+    result.error = halvesVariance(out.half);
+  }
+  result.remarks.push_back(gammaRemark(gamma));
+  return result;
+}
+
+}  // namespace
+
+std::unique_ptr<Method> make_uncorrelated() { return std::make_unique<Uncorrelated>(); }
+
+}  // namespace braid

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cross-weighting, a baseline of input-dependent uncorrelated weighting: the weights of each half of the samples come
+// from the other half, so they are independent of what they weight and the image has no bias; but they cannot avoid the
+// noise that is in it. The result is the mean of both halves.
+#include "combiners/registry.h"
+#include "combiners/uncorrelated_groups.h"
+
+namespace braid {
+
+namespace {
+
+const OptionInfo kGamma{"uncorrelated-cross-gamma", -1,
+                        "Sensitivity of the weights to noise; negative: chosen by variance"};
+
+class UncorrelatedCross : public Method {
+ public:
+  const char* name() const override { return "uncorrelated-cross"; }
+  const char* description() const override {
+    return "Independent and correlated image, each half weighted by the other: an unbiased baseline";
+  }
+  MethodKind kind() const override { return MethodKind::Combiner; }
+  Needs needs() const override {
+    Needs needs;
+    needs.correlated = needs.quarters = true;
+    needs.passes = 4;
+    needs.variance = false;
+    return needs;
+  }
+  std::vector<OptionInfo> options() const override { return {kGamma}; }
+
+  MethodResult run(const MethodInputs& in) const override {
+    const Estimate &y = *in.unbiased, &z = *in.correlated;
+    const UncorrelatedInputs groups[2] = {uncorrelatedGroup(y, z, 0, 0, 1), uncorrelatedGroup(y, z, 1, 1, 0)};
+    const double gamma = chosenGamma(in, kGamma, groups);
+    MethodResult result;
+    Estimate& out = result.image;
+    for (int h = 0; h < 2; ++h) out.half[h] = uncorrelatedFiltered(groups[h], gamma);
+    out.mean = out.half[0];
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t i = 0; i < out.mean.size(); ++i) out.mean[c][i] = 0.5f * (out.mean[c][i] + out.half[1][c][i]);
+    result.error = halvesVariance(out.half);
+    result.remarks.push_back(gammaRemark(gamma));
+    return result;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Method> make_uncorrelated_cross() { return std::make_unique<UncorrelatedCross>(); }
+
+}  // namespace braid

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combiners/uncorrelated_filter.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "combiners/denoise/window.h"
+#include "combiners/finite_float.h"
+#include "combiners/mirror.h"
+
+namespace braid {
+
+namespace {
+
+constexpr int kRadius = 7;
+constexpr float kNeighbours = (2 * kRadius + 1) * (2 * kRadius + 1) - 1;
+constexpr int kBlock = 128;  // columns at a time: the sums of all candidates stay in the first cache
+// Weights below 2^-80 are nothing, and their products would be subnormal numbers, which take hundreds of cycles.
+constexpr float kLowestExponent = -80;
+constexpr size_t kCandidates = kUncorrelatedGammas.size();
+
+// a - b with mirrored pixels around it.
+Plane<float> paddedDifference(const Plane<float>& a, const Plane<float>& b) {
+  Plane<float> out(a.width, a.height);
+  parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) out[i] = a[i] - b[i];
+  });
+  return mirrorPadded(out, kRadius);
+}
+
+// h and g of one channel.
+struct Padded {
+  Plane<float> h, g;
+};
+Padded padded(const UncorrelatedInputs& in, size_t c) {
+  return {paddedDifference((*in.first)[c], (*in.second)[c]),
+          paddedDifference((*in.correlated)[c], (*in.independent)[c])};
+}
+
+// Rows of a padded plane: at pixel (x, y) of the image, and at its neighbour.
+const float* rowOf(const Plane<float>& padded, int x, int y) {
+  return padded.data.data() + padded.index(x + kRadius, y + kRadius);
+}
+
+// Adds the terms of one neighbour for `count` pixels of a row to the sums of one gamma; `exponent` is -gamma n log2(e).
+void addOne(const float* __restrict hc, const float* __restrict hi, const float* __restrict gc,
+            const float* __restrict gi, float exponent, int count, float* __restrict sum) {
+  for (int x = 0; x < count; ++x) {
+    const float d = hc[x] - hi[x];
+    sum[x] += exp2NonPositive(std::max(exponent * (d * d), kLowestExponent)) * (gc[x] - gi[x]);
+  }
+}
+
+// The same for all candidates; `exponent` is -n log2(e). Three exponentials are enough, the other weights are products
+// of them. Weights below 10⁻¹⁸ are raised to it before they are multiplied, so that no product is subnormal.
+void addAll(const float* __restrict hc, const float* __restrict hi, const float* __restrict gc,
+            const float* __restrict gi, float exponent, int count, float (&__restrict sums)[kCandidates][kBlock]) {
+  constexpr float kTiny = 1e-18f;
+  for (int x = 0; x < count; ++x) {
+    const float d = hc[x] - hi[x], g = gc[x] - gi[x], e = exponent * (d * d);
+    const float k001 = exp2NonPositive(std::max(0.01f * e, kLowestExponent));
+    const float k0025 = std::max(exp2NonPositive(0.025f * e), kTiny), k005 = std::max(k0025 * k0025, kTiny);
+    const float k01 = std::max(k005 * k005, kTiny), k02 = k01 * k01;
+    const float k05 = std::max(exp2NonPositive(0.5f * e), kTiny), k1 = std::max(k05 * k05, kTiny);
+    const float k15 = k1 * k05, k2 = std::max(k1 * k1, kTiny), k25 = k2 * k05;
+    sums[0][x] += k001 * g;
+    sums[1][x] += k0025 * g;
+    sums[2][x] += k005 * g;
+    sums[3][x] += k01 * g;
+    sums[4][x] += k02 * g;
+    sums[5][x] += k05 * g;
+    sums[6][x] += k1 * g;
+    sums[7][x] += k15 * g;
+    sums[8][x] += k2 * g;
+    sums[9][x] += k25 * g;
+  }
+}
+
+// Calls add(hc, hi, gc, gi) for every neighbour of the pixels from (x0, y) on.
+template <class Add>
+void forNeighbours(const Padded& in, int x0, int y, const Add& add) {
+  const float *hc = rowOf(in.h, x0, y), *gc = rowOf(in.g, x0, y);
+  for (int dy = -kRadius; dy <= kRadius; ++dy)
+    for (int dx = -kRadius; dx <= kRadius; ++dx)
+      if (dx != 0 || dy != 0) add(hc, rowOf(in.h, x0 + dx, y + dy), gc, rowOf(in.g, x0 + dx, y + dy));
+}
+
+// Σ k (g_c - g_i) / 224 of every candidate for `count` pixels of row y.
+void candidateSums(const Padded& in, double samples, int x0, int y, int count, float (&sums)[kCandidates][kBlock]) {
+  for (auto& row : sums) std::fill_n(row, kBlock, 0.0f);
+  const float exponent = -static_cast<float>(samples) * kLog2E;
+  runVectorised([&] {
+    forNeighbours(in, x0, y, [&](const float* hc, const float* hi, const float* gc, const float* gi) {
+      addAll(hc, hi, gc, gi, exponent, count, sums);
+    });
+  });
+  for (auto& row : sums)
+    for (float& s : row) s /= kNeighbours;
+}
+
+// The scores of the pixels of one row of a channel, added to `scores`. `level` is ybar.
+void addRowScores(const Padded (&in)[2], const UncorrelatedInputs (&groups)[2], const Plane<double>& level, size_t c,
+                  int y, std::array<double, kCandidates>& scores) {
+  float sums[2][kCandidates][kBlock];
+  const int width = level.width;
+  for (int x0 = 0; x0 < width; x0 += kBlock) {
+    const int count = std::min(kBlock, width - x0);
+    for (size_t j = 0; j < 2; ++j) candidateSums(in[j], groups[j].samples, x0, y, count, sums[j]);
+    for (int x = 0; x < count; ++x) {
+      const size_t i = level.index(x0 + x, y);
+      const double base =
+          static_cast<double>((*groups[0].independent)[c][i]) - static_cast<double>((*groups[1].independent)[c][i]);
+      for (size_t k = 0; k < kCandidates; ++k) {
+        const double d = base + static_cast<double>(sums[0][k][x]) - static_cast<double>(sums[1][k][x]);
+        scores[k] += d * d / (level[i] * level[i] + 0.01);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Rgb<float> uncorrelatedFiltered(const UncorrelatedInputs& in, double gamma) {
+  const Rgb<float>& y = *in.independent;
+  const int width = y.width();
+  const float exponent = -static_cast<float>(gamma * in.samples) * kLog2E;
+  Rgb<float> out(width, y.height());
+  for (size_t c = 0; c < 3; ++c) {
+    const Padded planes = padded(in, c);
+    parallelRows(y.height(), [&](int row) {
+      float sum[kBlock];
+      for (int x0 = 0; x0 < width; x0 += kBlock) {
+        const int count = std::min(kBlock, width - x0);
+        std::fill_n(sum, kBlock, 0.0f);
+        runVectorised([&] {
+          forNeighbours(planes, x0, row, [&](const float* hc, const float* hi, const float* gc, const float* gi) {
+            addOne(hc, hi, gc, gi, exponent, count, sum);
+          });
+        });
+        for (int x = 0; x < count; ++x) out[c].at(x0 + x, row) = y[c].at(x0 + x, row) + sum[x] / kNeighbours;
+      }
+    });
+  }
+  return out;
+}
+
+Rgb<float> uniformlyFiltered(const Rgb<float>& independent, const Rgb<float>& correlated) {
+  Rgb<float> out(independent.width(), independent.height());
+  for (size_t c = 0; c < 3; ++c) {
+    Plane<float> g = correlated[c];
+    for (size_t i = 0; i < g.size(); ++i) g[i] -= independent[c][i];
+    const Plane<double> mean = mirrorBoxMean(g, kRadius);
+    for (size_t i = 0; i < g.size(); ++i) out[c][i] = finiteFloat(static_cast<double>(correlated[c][i]) - mean[i]);
+  }
+  return out;
+}
+
+std::array<double, kCandidates> uncorrelatedScores(const UncorrelatedInputs (&groups)[2], const Rgb<float>& guide,
+                                                   int rowStep) {
+  const int height = guide.height(), rows = (height + rowStep - 1) / rowStep;
+  std::array<double, kCandidates> total{};
+  for (size_t c = 0; c < 3; ++c) {
+    const Padded planes[2] = {padded(groups[0], c), padded(groups[1], c)};
+    const Plane<double> level = mirrorBoxMean(guide[c], kRadius);
+    std::vector<std::array<double, kCandidates>> ofRow(static_cast<size_t>(rows));
+    parallelRows(rows, [&](int r) {
+      ofRow[static_cast<size_t>(r)] = {};
+      addRowScores(planes, groups, level, c, r * rowStep, ofRow[static_cast<size_t>(r)]);
+    });
+    for (const auto& row : ofRow)
+      for (size_t k = 0; k < kCandidates; ++k) total[k] += row[k];
+  }
+  for (double& score : total) score /= 3.0 * rows * guide.width();
+  return total;
+}
+
+double bestGamma(const std::array<double, kCandidates>& scores) {
+  size_t best = 0;
+  for (size_t k = 1; k < kCandidates; ++k)
+    if (std::isfinite(scores[k]) && (!std::isfinite(scores[best]) || scores[k] < scores[best])) best = k;
+  return static_cast<double>(kUncorrelatedGammas[best]);
+}
+
+}  // namespace braid

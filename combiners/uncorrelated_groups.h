@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the methods of uncorrelated weighting share: the groups of quarters, and the search for gamma.
+#pragma once
+
+#include <string>
+
+#include "combiners/denoise/variance.h"
+#include "combiners/uncorrelated_filter.h"
+#include "renderer/film/combiner.h"
+
+namespace braid {
+
+// Half `values` of both images, combined with weights from the two quarters of half `weights` of the correlated image:
+// quarters 0 and 2 make half 0. The halves of the images are used as the means of the pairs of quarters, for they are
+// right even if the quarters differ in passes.
+inline UncorrelatedInputs uncorrelatedGroup(const Estimate& y, const Estimate& z, size_t independentHalf,
+                                            size_t correlatedHalf, size_t weights) {
+  return {&y.half[independentHalf], &z.half[correlatedHalf], &z.quarter[weights], &z.quarter[weights + 2],
+          static_cast<double>(passesOf(z)) / 4};
+}
+
+// The option when it is set, or else the best gamma for these groups. Large images vote with every fourth row.
+inline double chosenGamma(const MethodInputs& in, const OptionInfo& option, const UncorrelatedInputs (&groups)[2]) {
+  const double wanted = in.options.number(option);
+  if (wanted >= 0) return wanted;
+  constexpr size_t kLarge = 1 << 16;
+  return bestGamma(uncorrelatedScores(groups, in.unbiased->mean, in.unbiased->mean.size() > kLarge ? 4 : 1));
+}
+
+// The error of an image whose halves are independent and whose bias is negligible: (A - B)² / 4, averaged over channels
+// and over 7x7 pixels.
+Plane<float> halvesVariance(const Rgb<float> (&halves)[2]);
+
+inline Attribute gammaRemark(double gamma) {
+  Attribute remark;
+  remark.name = "gamma";
+  remark.kind = Attribute::Kind::Float;
+  remark.number = gamma;
+  return remark;
+}
+
+}  // namespace braid

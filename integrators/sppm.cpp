@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// Stochastic progressive photon mapping (Hachisuka and Jensen 2009) with the radii of Knaus and Zwicker 2011, which
+// depend on the pass alone: each pass is an independent estimate with its own radius, and the mean over passes equals
+// the classic recursion. Passes estimate their bias by comparing two radii (ALGORITHMS 6.2). What is gathered where:
+// sppm_eye.h.
+#include <fmt/format.h>
+
+#include "integrators/light_preparation.h"
+#include "integrators/registry.h"
+#include "integrators/sppm_eye.h"
+#include "integrators/sppm_gather.h"
+#include "integrators/sppm_preparation.h"
+#include "integrators/tiles.h"
+
+namespace braid {
+
+namespace {
+
+constexpr uint64_t kEyeStream = 0x73707000, kLightStream = 0x73707001;
+
+class PhotonMapper final : public Integrator {
+ public:
+  const char* name() const override { return "sppm"; }
+  const char* description() const override {
+    return "stochastic progressive photon mapping, direct light by next-event estimation";
+  }
+  bool unbiased() const override { return false; }
+  bool estimatesBias() const override { return true; }
+  Applies applies(const SceneTraits& traits, const LightReach& reach) const override {
+    return lightSubpathsApply(traits, reach);
+  }
+
+  WorkingMemory workingMemory(const Plan& plan) const override {
+    const uint64_t paths = photonPaths(plan);
+    const auto stored = static_cast<uint64_t>(kStoredPerPath * static_cast<double>(paths));
+    return {PhotonGrid::bytesWhileBuilding(stored),
+            fmt::format("for the photons of {} light paths a pass, {} kept of each on average at most; first radius {} "
+                        "pixels, direct light by {}, lights chosen by power{}",
+                        paths, kStoredPerPath, plan.settings.photonRadius,
+                        plan.settings.photonDirect ? "photons" : "next-event estimation",
+                        plan.settings.photonAiming ? " and by whether their photons arrive in view" : "")};
+  }
+
+  std::shared_ptr<const Preparation> prepare(const TransportContext& context, const Plan& plan) const override {
+    return std::make_shared<PhotonPreparation>(context, plan);
+  }
+
+  bool renderPass(const PassRequest& request, PassTarget& target) const override;
+};
+
+// Adds what the photons about a vertex send to the eye, and returns the bias of that.
+Spectrum addPhotons(const PhotonGrid& grid, const SubpathVertex& vertex, const Plan& plan, double lightPaths,
+                    PathSample& sample) {
+  const float radius = grid.scale().radiusAt(vertex.hit.position, vertex.travelled);
+  const PhotonSum sum = gatherPhotons(grid, vertex, radius, plan.settings.maxDepth - vertex.segments);
+  const double area = static_cast<double>(kPi) * sqr(static_cast<double>(radius));
+  const auto scale = static_cast<float>(1 / (lightPaths * area));
+  sample.radiance += vertex.throughput * (sum.inner + sum.outer) * scale;
+  // The bias of a constant kernel grows with its area: that of the whole disc is twice its excess over half of it.
+  return vertex.throughput * (2.0f * (sum.outer - sum.inner)) * scale;
+}
+
+bool PhotonMapper::renderPass(const PassRequest& request, PassTarget& target) const {
+  const Plan& plan = request.plan;
+  const PhotonPreparation::Ref preparation(request);
+  const PassSampler lightSampler(plan.settings.sampler, plan.settings.seed, kLightStream, request.pass);
+  const PassSampler eyeSampler(plan.settings.sampler, plan.settings.seed, kEyeStream, request.pass);
+  const uint64_t paths = photonPaths(plan);
+  TracedPhotons traced;
+  if (plan.settings.maxDepth > 1 && !preparation->emission().empty() &&
+      !tracePhotons(request.context, {preparation->emission(), lightSampler, paths}, plan.settings, preparation->keep(),
+                    request.cancel, traced))
+    return false;
+  if (request.statistics) request.statistics->rays += traced.segments;
+  const PhotonGrid grid(std::move(traced.photons), gatherRadii(plan, request.context.scene.traits(), request.pass));
+  const MediaStack cameraMedia = mediaOfCamera(request.context.scene, plan.camera);
+
+  return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>*) {
+    PhotonEyeBatch batch(request.context, plan, eyeSampler, cameraMedia);
+    std::array<Spectrum, kBatch> bias;
+    const int pixels = tile.width() * tile.height();
+    const auto pixelX = [&](int i) { return tile.x0 + i % tile.width(); };
+    const auto pixelY = [&](int i) { return tile.y0 + i / tile.width(); };
+    for (int first = 0; first < pixels; first += kBatch) {
+      const int last = std::min(pixels, first + kBatch);
+      batch.clear();
+      bias.fill(Spectrum(0));
+      for (int i = first; i < last; ++i)
+        batch.start(pixelX(i), pixelY(i), pixelKey(eyeSampler, plan, pixelX(i), pixelY(i)));
+      batch.run([&](int i, const SubpathVertex& vertex) {
+        bias[static_cast<size_t>(i)] = addPhotons(grid, vertex, plan, static_cast<double>(paths), batch.sample(i));
+      });
+      for (int i = first; i < last; ++i) {
+        const PathSample& sample = batch.sample(i - first);
+        storeSample(request, pixelX(i), pixelY(i), sample, target);
+        if (!target.wantsBias()) continue;
+        const float largest = maxComponent(sample.radiance), clamp = plan.settings.clamp;
+        const float scale = clamp > 0 && largest > clamp ? clamp / largest : 1.0f;
+        target.bias(pixelX(i) - plan.window.x0, pixelY(i) - plan.window.y0,
+                    bias[static_cast<size_t>(i - first)] * scale);
+      }
+    }
+    return TileCounts{static_cast<uint64_t>(tile.width()) * static_cast<uint64_t>(tile.height()), batch.rayCount(),
+                      batch.shadowRayCount};
+  });
+}
+
+}  // namespace
+
+std::unique_ptr<Integrator> make_sppm() { return std::make_unique<PhotonMapper>(); }
+
+}  // namespace braid

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "integrators/sppm_eye.h"
+
+#include <optional>
+
+#include "renderer/core/error.h"
+#include "renderer/session/pixel_filter.h"
+#include "renderer/transport/mis.h"
+
+namespace braid {
+
+namespace {
+
+// Shadow rays stop this share of their length before the light, so that its own triangle does not shadow it.
+constexpr float kShadowLength = 1 - 1e-4f;
+
+WalkSettings eyeSettings(const Plan& plan) {
+  WalkSettings s;
+  s.transport = Transport::Radiance;
+  s.maxSegments = plan.settings.maxDepth;
+  s.mis = false;
+  return s;
+}
+
+}  // namespace
+
+PhotonEyeBatch::PhotonEyeBatch(const TransportContext& context, const Plan& plan, const PassSampler& sampler,
+                               const MediaStack& cameraMedia)
+    : context_(context),
+      scene_(context.scene),
+      plan_(plan),
+      sampler_(sampler),
+      cameraMedia_(cameraMedia),
+      lightsCanBeHit_(!context.scene.emitters().empty() || context.scene.environment()),
+      walks_(context, sampler, eyeSettings(plan)) {}
+
+void PhotonEyeBatch::clear() {
+  walks_.clear();
+  count_ = 0;
+}
+
+void PhotonEyeBatch::start(int x, int y, uint64_t key) {
+  BRAID_ASSERT(count_ < kBatch);
+  const SampleBlock camera = sampler_.block(key, 0);
+  const PixelFilter filter = plan_.settings.filter;
+  Vec2 offset(camera.u[slot::kPixelX] - 0.5f, camera.u[slot::kPixelY] - 0.5f);
+  if (filter != PixelFilter::Box)
+    offset = {sampleFilter(filter, camera.u[slot::kPixelX]), sampleFilter(filter, camera.u[slot::kPixelY])};
+  const Camera::CameraRay ray =
+      plan_.camera.ray(Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) + offset);
+  path_[static_cast<size_t>(count_)] = Path();
+  sample_[static_cast<size_t>(count_)] = PathSample();
+  ++count_;
+  walks_.startCamera(key, ray, cameraMedia_, 1, 1, plan_.camera.orthographic());
+}
+
+PhotonEyeBatch::Step PhotonEyeBatch::shade(int index, SubpathState& state, SubpathVertex& vertex) {
+  Path& path = path_[static_cast<size_t>(index)];
+  const MaterialSummary& material = context_.summaryOf(vertex.hit);
+  if (material.unlit) {
+    addUnlit(index, state, vertex);
+    return {};
+  }
+  if (material.emissive) addEmission(index, state, vertex);
+  if (path.seekingLight) return {};
+  const bool first = plan_.features && !path.featuresDone && recordFeatures(index, vertex);
+  if (vertex.segments >= plan_.settings.maxDepth) return {};
+  path.choice = 1;
+  if (!vertex.bsdf.hasNonDelta()) return {.goesOn = true};
+
+  const SampleBlock block = sampler_.block(state.key, static_cast<unsigned>(state.segments));
+  const float share = vertex.bsdf.broadShare();
+  std::optional<Bsdf> broad, narrow;
+  if (share > 0 && share < 1) {
+    broad.emplace(vertex.bsdf.restricted(LobeGroup::Broad));
+    narrow.emplace(vertex.bsdf.restricted(LobeGroup::Narrow));
+  }
+  sampleLight(index, vertex,
+              {share > 0 ? (broad ? &*broad : &vertex.bsdf) : nullptr,
+               share < 1 ? (narrow ? &*narrow : &vertex.bsdf) : nullptr, share},
+              block, first);
+  const bool gathers = block.u[slot::kExtra] < share;
+  if (broad) {
+    path.choice = gathers ? share : 1 - share;
+    vertex.bsdf = gathers ? *broad : *narrow;
+    state.throughput /= path.choice;
+    vertex.throughput /= path.choice;
+  }
+  if (!gathers) return {.goesOn = true};
+  path.seekingLight = true;
+  return {.goesOn = lightsCanBeHit_ && !plan_.settings.photonDirect, .gather = true};
+}
+
+bool PhotonEyeBatch::recordFeatures(int index, const SubpathVertex& vertex) {
+  if (!vertex.bsdf.hasNonDelta() && vertex.segments < plan_.settings.maxDepth) return false;
+  const Hit& hit = vertex.hit;
+  path_[static_cast<size_t>(index)].featuresDone = true;
+  FeatureSample& f = sample_[static_cast<size_t>(index)].features;
+  f.albedo = vertex.bsdf.albedo();
+  if (hit.material->emissive()) f.albedo += scene_.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
+  f.normal = hit.frame.n;
+  f.depth = vertex.travelled;
+  return true;
+}
+
+// As in the path tracer: shown to the camera and to mirrors only.
+void PhotonEyeBatch::addUnlit(int index, const SubpathState& state, const SubpathVertex& vertex) {
+  const Spectrum color = baseColorAt(scene_, vertex.hit);
+  PathSample& sample = sample_[static_cast<size_t>(index)];
+  if (state.lightCouldNotBeSampled) sample.radiance += vertex.throughput * color;
+  bool& done = path_[static_cast<size_t>(index)].featuresDone;
+  if (!plan_.features || done) return;
+  done = true;
+  sample.features.albedo = color;
+  sample.features.normal = vertex.hit.frame.n;
+  sample.features.depth = vertex.travelled;
+}
+
+void PhotonEyeBatch::addEmission(int index, const SubpathState& state, const SubpathVertex& vertex) {
+  const Hit& hit = vertex.hit;
+  if (!hit.front && !hit.material->doubleSided) return;
+  const Spectrum radiance = scene_.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
+  if (isBlack(radiance)) return;
+  float weight = 1;
+  const int64_t emitter = scene_.emitterIndex(hit.meshIndex, hit.triangle, hit.instance);
+  const float cosLight = glm::dot(hit.wo, hit.ng);
+  if (!state.lightCouldNotBeSampled && emitter >= 0 && cosLight > 0) {
+    const float distance = glm::length(hit.position - state.lastPosition);
+    weight = powerHeuristic(path_[static_cast<size_t>(index)].choice * state.lastPdfW,
+                            context_.lights.pdfEmitter(state.lastPosition, state.lastNormal, state.lastTwoSided,
+                                                       static_cast<size_t>(emitter), distance, cosLight));
+  }
+  sample_[static_cast<size_t>(index)].radiance += vertex.throughput * radiance * weight;
+}
+
+void PhotonEyeBatch::addEnvironment(int index, const SubpathState& state) {
+  PathSample& sample = sample_[static_cast<size_t>(index)];
+  const Path& path = path_[static_cast<size_t>(index)];
+  const bool fromCamera = state.segments == 1;
+  if (fromCamera) sample.coverage = 0;
+  Spectrum radiance(0);
+  if (fromCamera && plan_.settings.background) {
+    radiance = *plan_.settings.background;
+  } else if (scene_.environment()) {
+    radiance = scene_.environment()->radiance(state.direction);
+  }
+  if (plan_.features && !path.featuresDone) {
+    sample.features.albedo = radiance;
+    sample.features.normal = -state.direction;
+    sample.features.depth = 0;
+  }
+  if (fromCamera && plan_.settings.transparent) return;
+  float weight = 1;
+  if (!state.lightCouldNotBeSampled)
+    weight = powerHeuristic(path.choice * state.lastPdfW, context_.lights.pdfEnvironment(state.direction));
+  sample.radiance += state.throughput * radiance * weight;
+}
+
+void PhotonEyeBatch::sampleLight(int index, const SubpathVertex& vertex, const Lobes& lobes, const SampleBlock& block,
+                                 bool forFeatures) {
+  const Hit& hit = vertex.hit;
+  LightSample light;
+  if (!context_.lights.sample(hit.position, vertex.receiverNormal(), vertex.twoSided, block.u[slot::kLightSelect],
+                              {block.u[slot::kLightU], block.u[slot::kLightV]}, light))
+    return;
+  const Vec3 wi = hit.frame.toLocal(light.wi);
+  const bool reflects = glm::dot(light.wi, hit.ng) > 0;
+  if (reflects != (wi.z > 0) || (!reflects && !vertex.twoSided)) return;
+  // The two groups are estimated side by side; each has its own density of hitting the light.
+  Spectrum value(0);
+  const auto add = [&](const Bsdf* bsdf, float choice, bool counts) {
+    if (!bsdf || !counts) return;
+    const BsdfValue v = bsdf->evaluate(wi);
+    value += v.f * (light.delta ? 1.0f : powerHeuristic(light.pdfW, choice * v.pdfW));
+  };
+  add(lobes.broad, lobes.broadShare, !plan_.settings.photonDirect);
+  add(lobes.narrow, 1 - lobes.broadShare, true);
+  // Where photons bring the direct light, the ray still tells what is visible.
+  if (isBlack(value) && !(forFeatures && plan_.settings.photonDirect)) return;
+  Spectrum contribution = vertex.throughput * value * light.radiance * (1 / light.pdfW);
+  MediaStack media = vertex.media;
+  if (!reflects && context_.summaryOf(hit).volume) media.cross(hit.mesh->material, hit.front);
+  contribution *= mediaTransmittance(scene_, media, light.distance);
+
+  RayQuery ray{offsetOrigin(hit, light.wi), light.wi, kInfinity,
+               sampler_.salt(vertex.key, 0x10000u + static_cast<uint32_t>(vertex.segments)) & ~kCameraRay};
+  if (light.distance < kInfinity) {
+    // Aimed anew from the moved origin, as in the path tracer.
+    ray.direction = hit.position + light.wi * light.distance - ray.origin;
+    ray.tmax = kShadowLength;
+  }
+  shadowRays_.set(shadowCount_, ray);
+  shadow_[static_cast<size_t>(shadowCount_)] = {index, contribution, forFeatures};
+  if (++shadowCount_ == kBatch) traceShadows();
+}
+
+void PhotonEyeBatch::traceShadows() {
+  std::array<bool, kBatch> hidden;
+  scene_.accel().occluded(shadowRays_, shadowCount_, hidden.data());
+  shadowRayCount += static_cast<uint64_t>(shadowCount_);
+  for (int k = 0; k < shadowCount_; ++k) {
+    if (hidden[static_cast<size_t>(k)]) continue;
+    const Shadow& shadow = shadow_[static_cast<size_t>(k)];
+    PathSample& sample = sample_[static_cast<size_t>(shadow.index)];
+    sample.radiance += shadow.contribution;
+    if (shadow.forFeatures) sample.features.visibility = 1;
+  }
+  shadowCount_ = 0;
+}
+
+}  // namespace braid

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far an estimate is from the truth, from what it knows about itself: variance plus squared bias.
+#pragma once
+
+#include "renderer/film/estimates.h"
+
+namespace braid {
+
+// The squared bias of the mean, per pixel and channel average: max(0, F(B² - Var B)), F the average over 13 x 13 pixels
+// (ALGORITHMS 6.2). B² - Var B is an unbiased estimate of the square, and squares are averaged rather than biases
+// because these change their sign from pixel to pixel along edges: max(0, F(B)² - F(Var B)) found a twentieth of the
+// squared bias of a caustic. Zero for estimates without a bias plane.
+Plane<float> squaredBias(const Estimate& estimate);
+
+// Estimated squared error of the mean, averaged over the channels: variance + squaredBias().
+Plane<float> errorMap(const Estimate& estimate);
+
+}  // namespace braid

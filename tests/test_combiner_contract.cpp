@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every registered denoiser and combiner must keep: finite images from any input, the same bits for any number of
+// threads, behaviour that does not depend on the units of light, and names that users can type. The registry is
+// iterated, so a new method is covered by being in it.
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <set>
+#include <sstream>
+
+#include <doctest/doctest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include "combiners/outside_method.h"
+#include "combiners/pipeline.h"
+#include "combiners/registry.h"
+#include "renderer/core/error.h"
+#include "renderer/film/exr.h"
+#include "tests/combiner_fixture.h"
+#include "tests/gltf_fixture.h"
+#include "tools/estimates_file.h"
+
+using namespace braid;
+using namespace braid::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+// The methods that can run here: without those that want a file or a library.
+std::vector<std::shared_ptr<const Method>> runnableMethods() {
+  std::vector<std::shared_ptr<const Method>> list;
+  for (auto& m : makeMethods()) {
+    const auto* outside = dynamic_cast<const OutsideMethod*>(m.get());
+    if (!outside || outside->obstacle().empty()) list.push_back(std::move(m));
+  }
+  return list;
+}
+
+CaseOptions sized(int width, int height, uint64_t samples = 16) {
+  CaseOptions o;
+  o.width = width;
+  o.height = height;
+  o.samples = samples;
+  return o;
+}
+
+// Everything that a method may need: pt with history, crn, sppm, and two denoised images as bases.
+Estimates everything(const Case& c) {
+  Estimates e = c.estimates;
+  for (const Estimate& d : c.denoised) e.estimates.push_back(d);
+  return e;
+}
+
+PipelineOptions basesNamed() {
+  PipelineOptions options;
+  options.roles.bases = {"narrow", "wide", "sppm"};
+  return options;
+}
+
+// The method on the estimates. Those that run their denoiser again get the box filter, the others the photon map.
+PipelineOutput outputOf(const Method& method, const Estimates& estimates) {
+  std::string name = method.name();
+  if (method.needs().redenoise)
+    name += "@box";
+  else if (method.needs().biased)
+    name += "@sppm";
+  const PipelineResult result = runPipeline(estimates, {name}, basesNamed());
+  REQUIRE(result.find(name));
+  return *result.find(name);
+}
+
+// The planes of a result that hold a value that is not finite, or a squared error below 0.
+std::string badPlanes(const MethodResult& r) {
+  std::string bad;
+  const auto check = [&bad](bool ok, const std::string& name) {
+    if (!ok) bad += name + " ";
+  };
+  check(allFinite(r.image.mean), "mean");
+  check(allFinite(r.image.half[0]) && allFinite(r.image.half[1]), "half");
+  check(allFinite(r.image.variance), "variance");
+  check(allFinite(r.error) && std::all_of(r.error.data.begin(), r.error.data.end(), [](float v) { return v >= 0; }),
+        "error");
+  for (const NamedPlane& p : r.aovs) check(allFinite(p.plane), p.name);
+  return bad;
+}
+
+bool finiteResult(const MethodResult& r) { return badPlanes(r).empty(); }
+
+bool sameBits(const MethodResult& a, const MethodResult& b) {
+  return identical(a.image.mean, b.image.mean) && identical(a.image.half[0], b.image.half[0]) &&
+         identical(a.image.half[1], b.image.half[1]) && identical(a.error, b.error);
+}
+
+// Relative distance of two images: square root of summed squared differences over summed squares.
+double relativeDistance(const Rgb<float>& a, const Rgb<float>& b) {
+  double difference = 0, square = 0;
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t i = 0; i < b.size(); ++i) {
+      difference += sqr(static_cast<double>(a[c][i]) - static_cast<double>(b[c][i]));
+      square += sqr(static_cast<double>(b[c][i]));
+    }
+  return std::sqrt(difference / square);
+}
+
+void runsFinite(const Method& method, const Estimates& estimates) {
+  const PipelineOutput out = outputOf(method, estimates);
+  INFO(std::string(method.name()), ": ", out.step.obstacle);
+  REQUIRE(out.ran());
+  CHECK(out.result.image.mean.width() == estimates.width);
+  CHECK(out.result.image.mean.height() == estimates.height);
+  CHECK(badPlanes(out.result) == "");
+}
+
+// Puts bad values over the planes of an image, a different one every few pixels.
+void spoil(Rgb<float>& image, size_t offset) {
+  const float bad[] = {std::nanf(""), kInfinity, -kInfinity, -1.0f, 3e38f, -3e38f};
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t i = (offset + 5 * c) % 23; i < image.size(); i += 23) image[c][i] = bad[(i / 23 + offset) % 6];
+}
+
+Estimates spoiled(const Case& c) {
+  Estimates e = everything(c);
+  size_t offset = 0;
+  for (Estimate& x : e.estimates) {
+    spoil(x.mean, offset++);
+    for (Rgb<float>& half : x.half) spoil(half, offset++);
+    for (Rgb<float>& q : x.quarter) spoil(q, offset++);
+    for (Rgb<float>* image : {&x.variance, &x.bias, &x.biasVariance}) spoil(*image, offset++);
+  }
+  for (Checkpoint& k : e.history["pt"]) spoil(k.variance, offset++);
+  for (FeaturePlanes<Rgb<float>>* f : {&e.features->albedo, &e.features->normal})
+    for (Rgb<float>* image : {&f->mean, &f->half[0], &f->half[1], &f->variance}) spoil(*image, offset++);
+  for (FeaturePlanes<Plane<float>>* f : {&e.features->depth, &e.features->visibility})
+    for (Plane<float>* plane : {&f->mean, &f->half[0], &f->half[1], &f->variance})
+      for (size_t i = offset++ % 23; i < plane->size(); i += 23) (*plane)[i] = i % 2 ? std::nanf("") : kInfinity;
+  return e;
+}
+
+std::string fileText(const fs::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+}  // namespace
+
+TEST_CASE("Every file that makes a method has a line in combiners/list.def, and every line a file") {
+  const fs::path folder = fs::path(BRAID_SOURCE_DIR) / "combiners";
+  const std::regex maker(R"(make_(\w+)\(\)\s*\{)"), row(R"((^|\n)COMBINER\((\w+)\))");
+  std::set<std::string> files, rows;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.path().extension() != ".cpp") continue;
+    const std::string text = fileText(entry.path());
+    for (std::sregex_iterator m(text.begin(), text.end(), maker), end; m != end; ++m) files.insert((*m)[1]);
+  }
+  const std::string list = fileText(folder / "list.def");
+  for (std::sregex_iterator m(list.begin(), list.end(), row), end; m != end; ++m) rows.insert((*m)[2]);
+  CHECK(files == rows);
+  CHECK(makeMethods().size() == rows.size());
+}
+
+TEST_CASE("Methods have distinct names that users can type, a description, and options with their name") {
+  std::set<std::string> names;
+  for (const auto& m : makeMethods()) {
+    const std::string name = m->name();
+    CAPTURE(name);
+    CHECK(names.insert(name).second);
+    CHECK(std::regex_match(name, std::regex("[a-z][a-z0-9-]*")));
+    CHECK(name != "none");
+    CHECK(std::strlen(m->description()) > 10);
+    for (const OptionInfo& o : m->options()) {
+      CAPTURE(o.name);
+      CHECK(std::regex_match(o.name, std::regex("[a-z][a-z0-9-]*-[a-z0-9-]+")));
+      CHECK(o.description.size() > 5);
+      CHECK(std::isfinite(o.fallback));
+    }
+  }
+}
+
+TEST_CASE("Every method runs on a usual image, and its halves look like it") {
+  const Case c = makeCase(sized(48, 36, 32));
+  const Estimates e = everything(c);
+  for (const auto& m : runnableMethods()) {
+    CAPTURE(std::string(m->name()));
+    const PipelineOutput out = outputOf(*m, e);
+    INFO(out.step.obstacle);
+    REQUIRE(out.ran());
+    CHECK(badPlanes(out.result) == "");
+    // Nothing is a worse guess of the truth than black.
+    CHECK(meanSquaredError(out.result.image.mean, c.truth) < 0.5 * meanSquaredError(Rgb<float>(48, 36), c.truth));
+    const Estimate& image = out.result.image;
+    if (image.half[0].empty()) continue;
+    for (const Rgb<float>& half : image.half) CHECK(relativeDistance(half, image.mean) < 0.5);
+  }
+}
+
+TEST_CASE("Bad values in every input leave every method with a finite image") {
+  const Estimates e = spoiled(makeCase(sized(40, 30)));
+  for (const auto& m : runnableMethods()) runsFinite(*m, e);
+}
+
+TEST_CASE("Images without variance, without light and of any size come out finite") {
+  CaseOptions noiseless = sized(40, 30);
+  noiseless.noise = noiseless.correlatedNoise = noiseless.photonNoise = noiseless.featureNoise = 0;
+  CaseOptions black = sized(40, 30);
+  black.light = 0;
+  CaseOptions fireflies = sized(40, 30);
+  fireflies.fireflies = 0.002;
+  for (const CaseOptions& o : {noiseless, black, fireflies, sized(1, 1), sized(7, 3), sized(257, 89, 8)}) {
+    const Case c = makeCase(o);
+    const Estimates e = everything(c);
+    CAPTURE(o.width);
+    for (const auto& m : runnableMethods()) runsFinite(*m, e);
+  }
+}
+
+TEST_CASE("All-black images stay black") {
+  CaseOptions black = sized(24, 20);
+  black.light = 0;
+  const Case c = makeCase(black);
+  for (const auto& m : runnableMethods()) {
+    CAPTURE(std::string(m->name()));
+    CHECK(meanSquaredError(outputOf(*m, everything(c)).result.image.mean, c.truth) == 0);
+  }
+}
+
+TEST_CASE("One sample is enough, or refused with a reason, and never harmful") {
+  const Case c = makeCase(sized(24, 20, 1));
+  for (const auto& m : runnableMethods()) {
+    CAPTURE(std::string(m->name()));
+    const PipelineOutput out = outputOf(*m, everything(c));
+    if (out.ran())
+      CHECK(badPlanes(out.result) == "");
+    else
+      CHECK(out.step.obstacle.find("needs ") != std::string::npos);
+    MethodInputs direct = inputsOf(c, "wide");
+    bool ok = false;
+    try {
+      ok = finiteResult(m->run(direct));
+    } catch (const Error& e) {
+      ok = std::strlen(e.what()) > 10;  // a sentence
+    }
+    CHECK(ok);
+  }
+}
+
+TEST_CASE("A constant image without noise is invariant") {
+  CaseOptions o = sized(40, 30);
+  o.noise = o.correlatedNoise = o.photonNoise = 0;
+  o.constant = 0.7;
+  const Case c = makeCase(o);
+  for (const auto& m : runnableMethods()) {
+    CAPTURE(std::string(m->name()));
+    // Rounding through normalisation, regression and normalised weights.
+    CHECK(relativeDistance(outputOf(*m, everything(c)).result.image.mean, c.truth) < 1e-4);
+  }
+}
+
+TEST_CASE("The number of threads changes no bit of any method") {
+  const tbb::global_control many(tbb::global_control::max_allowed_parallelism, 8);
+  const Estimates e = everything(makeCase(sized(67, 45)));
+  for (const auto& m : runnableMethods()) {
+    CAPTURE(std::string(m->name()));
+    MethodResult results[3];
+    size_t k = 0;
+    for (const int threads : {1, 2, 5}) {
+      tbb::task_arena arena(threads);
+      results[k++] = arena.execute([&] { return outputOf(*m, e).result; });
+    }
+    CHECK(sameBits(results[0], results[1]));
+    CHECK(sameBits(results[0], results[2]));
+  }
+}
+
+TEST_CASE("Scaling all lights scales the image of every method and nothing else") {
+  CaseOptions o = sized(48, 36);
+  const Estimates one = everything(makeCase(o));
+  for (const double light : {1e-6, 1e6}) {
+    o.light = light;
+    const Estimates scaled = everything(makeCase(o));
+    for (const auto& m : runnableMethods()) {
+      CAPTURE(std::string(m->name()));
+      CAPTURE(light);
+      MethodResult a = outputOf(*m, one).result, b = outputOf(*m, scaled).result;
+      scaleExposure(b, 1 / light);
+      // The scaled samples are rounded anew; a choice between equals may fall the other way in a pixel.
+      CHECK(relativeDistance(b.image.mean, a.image.mean) < 1e-3);
+      if (a.error.empty()) continue;
+      double sums[2] = {0, 0};
+      for (size_t i = 0; i < a.error.size(); ++i) {
+        sums[0] += static_cast<double>(a.error[i]);
+        sums[1] += static_cast<double>(b.error[i]);
+      }
+      CHECK(sums[1] == doctest::Approx(sums[0]).epsilon(1e-2));
+    }
+  }
+}
+
+TEST_CASE("From files every method makes what it makes in process") {
+  const Folder folder;
+  Estimates e = everything(makeCase(sized(40, 30)));
+  const std::string path = folder.path / "all.exr";
+  ExrOptions options;
+  options.quarters = options.history = true;
+  e.attributes = estimateAttributes(e);
+  writeExr(path, e, e.estimates[0].mean, nullptr, options);
+  const Estimates read = readEstimates(readImage(path));
+  REQUIRE(read.estimates.size() == e.estimates.size());
+  for (const auto& m : runnableMethods()) {
+    CAPTURE(std::string(m->name()));
+    const PipelineOutput a = outputOf(*m, e), b = outputOf(*m, read);
+    INFO(b.step.obstacle);
+    REQUIRE(b.ran());
+    CHECK(sameBits(a.result, b.result));
+  }
+}

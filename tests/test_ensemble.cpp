@@ -1,0 +1,411 @@
+// SPDX-License-Identifier: Apache-2.0
+// Ensemble denoising: the closed form, the solver against exact solutions, the objective and its published constants,
+// the filter of the weights, and what the method makes of synthetic renders.
+#include <cmath>
+#include <random>
+
+#include <doctest/doctest.h>
+
+#include "combiners/ensemble_weights.h"
+#include "combiners/registry.h"
+#include "combiners/simplex_solver.h"
+#include "combiners/weight_filter.h"
+#include "tests/combiner_fixture.h"
+
+using namespace braid;
+using namespace braid::test;
+
+namespace {
+
+using Matrix = std::vector<std::vector<double>>;
+
+double quadratic(const Matrix& m, const std::vector<double>& w) {
+  double sum = 0;
+  for (size_t i = 0; i < w.size(); ++i)
+    for (size_t j = 0; j < w.size(); ++j) sum += w[i] * m[i][j] * w[j];
+  return sum;
+}
+
+// Solves a x = b by elimination with pivoting; false where it is singular.
+bool solveLinear(Matrix a, std::vector<double> b, std::vector<double>& x) {
+  const size_t n = b.size();
+  for (size_t k = 0; k < n; ++k) {
+    size_t pivot = k;
+    for (size_t i = k + 1; i < n; ++i)
+      if (std::fabs(a[i][k]) > std::fabs(a[pivot][k])) pivot = i;
+    if (std::fabs(a[pivot][k]) < 1e-9) return false;
+    std::swap(a[k], a[pivot]);
+    std::swap(b[k], b[pivot]);
+    for (size_t i = k + 1; i < n; ++i) {
+      const double f = a[i][k] / a[k][k];
+      for (size_t j = k; j < n; ++j) a[i][j] -= f * a[k][j];
+      b[i] -= f * b[k];
+    }
+  }
+  x.assign(n, 0);
+  for (size_t k = n; k-- > 0;) {
+    double sum = b[k];
+    for (size_t j = k + 1; j < n; ++j) sum -= a[k][j] * x[j];
+    x[k] = sum / a[k][k];
+  }
+  return true;
+}
+
+// The minimum of wᵀMw over the simplex: of all subsets of weights that may differ from 0, the best stationary point
+// without negative weights. Exact as long as M has full rank.
+double exactMinimum(const Matrix& m) {
+  const size_t n = m.size();
+  double best = 1e300;
+  for (size_t subset = 1; subset < (size_t(1) << n); ++subset) {
+    std::vector<size_t> active;
+    for (size_t i = 0; i < n; ++i)
+      if (subset >> i & 1) active.push_back(i);
+    const size_t k = active.size();
+    Matrix a(k + 1, std::vector<double>(k + 1, 1.0));
+    std::vector<double> b(k + 1, 0.0), x;
+    a[k][k] = 0;
+    b[k] = 1;
+    for (size_t i = 0; i < k; ++i)
+      for (size_t j = 0; j < k; ++j) a[i][j] = m[active[i]][active[j]];
+    if (!solveLinear(a, b, x)) continue;
+    std::vector<double> w(n, 0.0);
+    bool inside = true;
+    for (size_t i = 0; i < k; ++i) {
+      w[active[i]] = x[i];
+      inside = inside && x[i] >= -1e-12;
+    }
+    if (inside) best = std::min(best, quadratic(m, w));
+  }
+  return best;
+}
+
+std::vector<double> solved(const Matrix& m, bool nonNegative = true) {
+  const size_t n = m.size();
+  SimplexSolver solver(n, nonNegative);
+  for (size_t i = 0; i < n; ++i)
+    for (size_t j = 0; j <= i; ++j) std::fill_n(solver.entry(i, j), SimplexSolver::kLanes, m[i][j]);
+  solver.solve();
+  std::vector<double> w;
+  for (size_t i = 0; i < n; ++i) w.push_back(solver.weight(i)[SimplexSolver::kLanes - 1]);
+  return w;
+}
+
+double largest(const Matrix& m) {
+  double scale = 0;
+  for (size_t i = 0; i < m.size(); ++i) scale = std::max(scale, m[i][i]);
+  return scale;
+}
+
+// A sum of outer products of random errors, of deviations that differ by orders of magnitude, plus a common error.
+Matrix randomMatrix(size_t n, int terms, std::mt19937& random) {
+  std::normal_distribution<double> gauss;
+  std::vector<double> deviation(n);
+  for (double& d : deviation) d = std::exp(gauss(random));
+  Matrix m(n, std::vector<double>(n, 0.0));
+  for (int t = 0; t < terms; ++t) {
+    std::vector<double> e(n);
+    const double common = gauss(random);
+    for (size_t i = 0; i < n; ++i) e[i] = common + deviation[i] * gauss(random);
+    for (size_t i = 0; i < n; ++i)
+      for (size_t j = 0; j < n; ++j) m[i][j] += e[i] * e[j];
+  }
+  return m;
+}
+
+// One pixel with halves a and b in all channels.
+Estimate pixel(float a, float b) {
+  Estimate e;
+  e.half[0] = Rgb<float>(1, 1, a);
+  e.half[1] = Rgb<float>(1, 1, b);
+  e.mean = Rgb<float>(1, 1, 0.5f * (a + b));
+  e.variance = Rgb<float>(1, 1, 0.25f * (a - b) * (a - b));
+  return e;
+}
+
+std::vector<const Estimate*> pointers(const std::vector<Estimate>& list) {
+  std::vector<const Estimate*> out;
+  for (const Estimate& e : list) out.push_back(&e);
+  return out;
+}
+
+MethodResult runWith(const char* option, double value, const MethodInputs& in) {
+  MethodInputs copy = in;
+  if (option) copy.options.set(option, value);
+  return make_ensemble()->run(copy);
+}
+
+bool onSimplex(const WeightMaps& maps, size_t c) {
+  for (size_t i = 0; i < maps.planes[0].size(); ++i) {
+    double sum = 0;
+    for (size_t b = 0; b < maps.bases; ++b) {
+      if (maps.of(b, c)[i] < 0) return false;
+      sum += static_cast<double>(maps.of(b, c)[i]);
+    }
+    if (std::fabs(sum - 1) > 2e-6) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+TEST_CASE("Two denoisers: the weight is the closed form and the best of a grid") {
+  std::mt19937 random(1);
+  std::normal_distribution<float> gauss;
+  for (int trial = 0; trial < 200; ++trial) {
+    const Estimate x = pixel(gauss(random), gauss(random));
+    const std::vector<Estimate> y = {pixel(gauss(random), gauss(random)), pixel(gauss(random), gauss(random))};
+    const WeightMaps w = ensembleWeights(x, pointers(y), {.patchRadius = 0});
+    const auto at = [](const Estimate& e, int h) { return static_cast<double>(e.half[h][0][0]); };
+    const double xa = at(x, 0), xb = at(x, 1), a1 = at(y[0], 0), b1 = at(y[0], 1), a2 = at(y[1], 0), b2 = at(y[1], 1);
+    const double alpha = std::clamp(
+        ((a1 - xb) * (a1 - a2) + (b1 - xa) * (b1 - b2)) / ((a1 - a2) * (a1 - a2) + (b1 - b2) * (b1 - b2)), 0.0, 1.0);
+    CHECK(static_cast<double>(w.of(1, 0)[0]) == doctest::Approx(alpha).epsilon(1e-5));
+    // The objective of the halves themselves, not the matrix.
+    double best = 1e300, bestAlpha = 0;
+    for (int k = 0; k <= 1000; ++k) {
+      const double t = k / 1000.0, ea = (1 - t) * a1 + t * a2 - xb, eb = (1 - t) * b1 + t * b2 - xa;
+      if (ea * ea + eb * eb < best) best = ea * ea + eb * eb, bestAlpha = t;
+    }
+    CHECK(std::fabs(static_cast<double>(w.of(1, 0)[0]) - bestAlpha) < 6e-4);
+  }
+}
+
+TEST_CASE("Errors of whole images: the minimum, or the better end, of the reduced objective on a grid") {
+  std::mt19937 random(5);
+  std::normal_distribution<float> gauss;
+  int ends = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const Estimate x = pixel(gauss(random), gauss(random));
+    const std::vector<Estimate> y = {pixel(gauss(random), gauss(random)), pixel(gauss(random), gauss(random))};
+    const WeightMaps w = ensembleWeights(x, pointers(y), {.patchRadius = 0, .fullError = true});
+    const auto objective = [&](double t) {
+      const auto z = [&](int h) {
+        return (1 - t) * static_cast<double>(y[0].half[h][0][0]) + t * static_cast<double>(y[1].half[h][0][0]);
+      };
+      const auto half = [&](int h) { return static_cast<double>(x.half[h][0][0]); };
+      return 0.5 * (sqr(z(0) - half(1)) + sqr(z(1) - half(0))) - 0.25 * sqr(z(0) - z(1));
+    };
+    double best = 1e300;
+    for (int k = 0; k <= 1000; ++k) best = std::min(best, objective(k / 1000.0));
+    const auto found = static_cast<double>(w.of(1, 0)[0]);
+    CHECK(objective(found) < best + 1e-5);
+    ends += found == 0 || found == 1 ? 1 : 0;
+  }
+  CHECK(ends > 20);
+  CHECK(ends < 180);
+}
+
+TEST_CASE("The solver reaches the exact minimum of two to six denoisers within 1e-6") {
+  std::mt19937 random(2);
+  double worst = 0;
+  for (size_t n = 2; n <= 6; ++n)
+    for (int trial = 0; trial < 60; ++trial) {
+      const Matrix m = randomMatrix(n, 49, random);
+      const std::vector<double> w = solved(m);
+      double sum = 0;
+      for (const double x : w) {
+        CHECK(x >= 0);
+        sum += x;
+      }
+      CHECK(sum == doctest::Approx(1).epsilon(1e-12));
+      worst = std::max(worst, (quadratic(m, w) - exactMinimum(m)) / largest(m));
+    }
+  MESSAGE("worst excess relative to the largest entry: ", worst);
+  CHECK(worst < 1e-6);
+  CHECK(worst > -1e-9);
+}
+
+TEST_CASE("A rank of two, as one pixel has it, leaves nothing to gain either") {
+  std::mt19937 random(3);
+  for (int trial = 0; trial < 100; ++trial) {
+    const Matrix m = randomMatrix(4, 2, random);
+    const double reached = quadratic(m, solved(m));
+    // Against points of a fine grid on the simplex, for the exact solution is not unique.
+    double best = 1e300;
+    const int k = 24;
+    for (int a = 0; a <= k; ++a)
+      for (int b = 0; a + b <= k; ++b)
+        for (int c = 0; a + b + c <= k; ++c)
+          best =
+              std::min(best, quadratic(m, {a / double(k), b / double(k), c / double(k), (k - a - b - c) / double(k)}));
+    CHECK(reached <= best + 1e-6 * largest(m));
+  }
+}
+
+TEST_CASE("Scaling a matrix and adding a constant to it do not change the weights") {
+  // Why the constants of the published Eqs. 14, 24 and 25, which are wrong, do no harm.
+  std::mt19937 random(4);
+  for (int trial = 0; trial < 20; ++trial) {
+    Matrix m = randomMatrix(4, 49, random);
+    const std::vector<double> w = solved(m);
+    Matrix scaled = m, shifted = m;
+    for (size_t i = 0; i < 4; ++i)
+      for (size_t j = 0; j < 4; ++j) {
+        scaled[i][j] *= 1e-12;
+        shifted[i][j] += 0.1 * largest(m);
+      }
+    const std::vector<double> a = solved(scaled), b = solved(shifted);
+    for (size_t i = 0; i < 4; ++i) {
+      CHECK(a[i] == doctest::Approx(w[i]).epsilon(1e-9));
+      CHECK(std::fabs(b[i] - w[i]) < 2e-3);
+    }
+    CHECK(quadratic(m, b) < quadratic(m, w) + 1e-6 * largest(m));
+  }
+}
+
+TEST_CASE("Twice the objective is the sum of both squares less (x_A - x_B)², not twice that") {
+  // wᵀ<M>w by the definition of <M> for one pixel, against Eq. (25) with the factor corrected.
+  const double xa = 1.3, xb = 0.4, ya[2] = {0.9, 1.6}, yb[2] = {0.7, 1.1}, w[2] = {0.3, 0.7};
+  double definition = 0;
+  for (int i = 0; i < 2; ++i)
+    for (int j = 0; j < 2; ++j) {
+      const double a = xa * xb - xb * (ya[i] + ya[j]) + ya[i] * ya[j],
+                   b = xa * xb - xa * (yb[i] + yb[j]) + yb[i] * yb[j];
+      definition += w[i] * w[j] * 0.5 * (a + b);
+    }
+  const double za = w[0] * ya[0] + w[1] * ya[1], zb = w[0] * yb[0] + w[1] * yb[1];
+  CHECK(2 * definition == doctest::Approx(sqr(za - xb) + sqr(zb - xa) - sqr(xa - xb)));
+  CHECK(2 * definition != doctest::Approx(sqr(za - xb) + sqr(zb - xa) - 2 * sqr(xa - xb)));
+  // And the weights that the code finds minimise exactly that.
+  const std::vector<Estimate> y = {pixel(0.9f, 0.7f), pixel(1.6f, 1.1f)};
+  const WeightMaps found = ensembleWeights(pixel(1.3f, 0.4f), pointers(y), {.patchRadius = 0});
+  const double t = static_cast<double>(found.of(1, 0)[0]);
+  const auto objective = [&](double s) {
+    return sqr((1 - s) * ya[0] + s * ya[1] - xb) + sqr((1 - s) * yb[0] + s * yb[1] - xa);
+  };
+  for (const double s : {t - 0.01, t + 0.01})
+    if (s >= 0 && s <= 1) CHECK(objective(t) < objective(s));
+}
+
+TEST_CASE("Identical denoisers get equal weights, and their image comes back") {
+  const Case c = makeCase();
+  MethodInputs in = inputsOf(c);
+  in.bases = {&c.find("narrow"), &c.find("narrow")};
+  const MethodResult r = make_ensemble()->run(in);
+  for (const float w : r.aovs[0].plane.data) CHECK(w == doctest::Approx(0.5f).epsilon(1e-6));
+  CHECK(meanSquaredError(r.image.mean, c.find("narrow").mean) < 1e-12);
+}
+
+TEST_CASE("A denoiser that knows the truth gets nearly all weight") {
+  const Case c = makeCase();
+  Estimate exact = c.find("wide");
+  exact.mean = exact.half[0] = exact.half[1] = c.truth;
+  MethodInputs in = inputsOf(c);
+  Estimate black = exact;
+  black.mean = black.half[0] = black.half[1] = Rgb<float>(c.options.width, c.options.height);
+  in.bases = {&black, &exact};
+  CHECK(meanSquaredError(make_ensemble()->run(in).image.mean, c.truth) < 0.1 * meanSquaredError(c.pt().mean, c.truth));
+}
+
+TEST_CASE("Filtered weights stay on the simplex, halves average to the mean, and maps are the weights") {
+  const Case c = makeCase();
+  const MethodInputs in = inputsOf(c);
+  for (const bool shared : {false, true}) {
+    const WeightMaps raw = ensembleWeights(*in.unbiased, in.bases, {.patchRadius = 3, .shared = shared});
+    const WeightMaps maps = filteredWeights(raw, weightedEstimate(raw, in.bases), in.features);
+    for (size_t ch = 0; ch < 3; ++ch) {
+      CHECK(onSimplex(raw, ch));
+      CHECK(onSimplex(maps, ch));
+    }
+    CHECK(maps.channels == (shared ? 1 : 3));
+  }
+  const MethodResult r = make_ensemble()->run(in);
+  REQUIRE(r.aovs.size() == 3);
+  CHECK(r.aovs[0].name == "weight.ensemble.narrow");
+  const Estimate& e = r.image;
+  for (size_t i = 0; i < e.mean.size(); ++i)
+    CHECK(std::fabs(e.mean[0][i] - 0.5f * (e.half[0][0][i] + e.half[1][0][i])) < 1e-5f * (1 + e.mean[0][i]));
+}
+
+TEST_CASE("The filter of weights is the formula at a pixel near a corner") {
+  CaseOptions o;
+  o.width = 12;
+  o.height = 10;
+  const Case c = makeCase(o);
+  const MethodInputs in = inputsOf(c);
+  const WeightMaps raw = ensembleWeights(*in.unbiased, in.bases, {.patchRadius = 0});
+  const Estimate z = weightedEstimate(raw, in.bases);
+  const WeightMaps maps = filteredWeights(raw, z, in.features);
+  const int px = 2, py = 1;
+  const size_t p = z.mean[0].index(px, py);
+  const auto spread = [&](size_t i) {
+    double v = 0;
+    for (size_t k = 0; k < 3; ++k)
+      v += 0.5 * sqr(static_cast<double>(z.half[0][k][i] - z.half[1][k][i])) +
+           0.5e-6 * sqr(static_cast<double>(z.mean[k][i]));
+    return v + 0.5e-10;
+  };
+  double sum = 0, norm = 0;
+  for (int y = 0; y <= py + 7; ++y)
+    for (int x = 0; x <= px + 7; ++x) {
+      const size_t q = z.mean[0].index(x, y);
+      double dz = 0, da = 0, dn = 0;
+      for (size_t k = 0; k < 3; ++k) {
+        dz += sqr(static_cast<double>(z.mean[k][p] - z.mean[k][q]));
+        da += sqr(static_cast<double>(in.features->albedo.mean[k][p] - in.features->albedo.mean[k][q]));
+        dn += sqr(static_cast<double>(in.features->normal.mean[k][p] - in.features->normal.mean[k][q]));
+      }
+      const double e = ((x - px) * (x - px) + (y - py) * (y - py)) / 18.0 + dz / (spread(p) + spread(q)) / 8 +
+                       da / (2 * 0.25 * 0.25) + dn / (2 * 0.15 * 0.15);
+      sum += std::exp(-e) * static_cast<double>(raw.of(1, 2)[q]);
+      norm += std::exp(-e);
+    }
+  CHECK(static_cast<double>(maps.of(1, 2)[p]) == doctest::Approx(sum / norm).epsilon(1e-4));
+}
+
+TEST_CASE("An ensemble is no worse than its best base at 64 samples, better than the mean, and knows its error") {
+  CaseOptions o;
+  o.width = 96;
+  o.height = 72;
+  o.samples = 64;
+  double estimated = 0, actual = 0;
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    o.seed = seed;
+    const Case c = makeCase(o);
+    const MethodInputs in = inputsOf(c);
+    double best = 1e300;
+    for (const Estimate* b : in.bases) best = std::min(best, meanSquaredError(b->mean, c.truth));
+    const MethodResult r = make_ensemble()->run(in);
+    const double error = meanSquaredError(r.image.mean, c.truth);
+    MESSAGE("best base ", best, ", ensemble ", error, ", patch 1 ",
+            meanSquaredError(runWith("ensemble-patch", 1, in).image.mean, c.truth), ", average ",
+            meanSquaredError(make_average()->run(in).image.mean, c.truth));
+    CHECK(error < 1.02 * best);
+    CHECK(error < meanSquaredError(make_average()->run(in).image.mean, c.truth));
+    CHECK(error < meanSquaredError(runWith("ensemble-patch", 1, in).image.mean, c.truth));
+    for (const float e : r.error.data) estimated += static_cast<double>(e);
+    actual += error * static_cast<double>(r.error.size());
+  }
+  MESSAGE("estimated error over actual: ", estimated / actual);
+  CHECK(estimated > 0.4 * actual);
+  CHECK(estimated < 2.5 * actual);
+}
+
+TEST_CASE("Options: unfiltered, shared, signed weights and full errors run, and few passes mean equal weights") {
+  const Case c = makeCase();
+  const MethodInputs in = inputsOf(c);
+  const MethodResult usual = make_ensemble()->run(in);
+  for (const auto& [name, value] : {std::pair{"ensemble-filter", 0.0},
+                                    {"ensemble-shared", 1.0},
+                                    {"ensemble-non-negative", 0.0},
+                                    {"ensemble-full-error", 1.0}}) {
+    const MethodResult r = runWith(name, value, in);
+    CAPTURE(std::string(name));
+    CHECK(allFinite(r.image.mean));
+    CHECK_FALSE(identical(r.image.mean, usual.image.mean));
+    CHECK(meanSquaredError(r.image.mean, c.truth) < meanSquaredError(c.pt().mean, c.truth));
+  }
+  // A target outside the segment of both bases: only signed weights reach it.
+  const std::vector<Estimate> y = {pixel(1, 1), pixel(2, 2)};
+  CHECK(ensembleWeights(pixel(4, 4), pointers(y), {.patchRadius = 0}).of(1, 0)[0] == 1);
+  const WeightMaps w = ensembleWeights(pixel(4, 4), pointers(y), {.patchRadius = 0, .nonNegative = false});
+  CHECK(w.of(0, 0)[0] == doctest::Approx(-2));
+  CHECK(w.of(1, 0)[0] == doctest::Approx(3));
+  CaseOptions few;
+  few.samples = 4;
+  const Case f = makeCase(few);
+  const MethodResult r = make_ensemble()->run(inputsOf(f));
+  CHECK(meanSquaredError(r.image.mean, make_average()->run(inputsOf(f)).image.mean) < 1e-12);
+  REQUIRE(r.remarks.size() == 1);
+  CHECK(r.remarks[0].name == "weights");
+}

@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: Apache-2.0
+// The pipeline of denoisers and combiners: exposure, roles, order, chains, and the sentences of what cannot run.
+#include <doctest/doctest.h>
+
+#include "combiners/outside_method.h"
+#include "combiners/pipeline.h"
+#include "combiners/registry.h"
+#include "renderer/core/error.h"
+#include "tests/combiner_fixture.h"
+
+using namespace braid;
+using namespace braid::test;
+
+namespace {
+
+// pt and crn with everything, and sppm.
+Facts fullFacts() {
+  Facts f;
+  f.features = true;
+  f.estimates = {{"pt", true, Correlation::Independent, 64, true, true, true, 7},
+                 {"crn", true, Correlation::CommonRandomNumbers, 64, true, true, true, 7},
+                 {"sppm", false, Correlation::Independent, 64, true, true, true, 7}};
+  return f;
+}
+
+RecipeOptions boxes() {
+  RecipeOptions o;
+  o.denoisers = {"box"};
+  o.bases = {"box", "sppm"};
+  return o;
+}
+
+std::string obstacleOf(const Facts& facts, const std::string& name, const RecipeOptions& options = boxes()) {
+  const Recipe recipe = makeRecipe(facts, {name}, options);
+  REQUIRE(recipe.find(name));
+  return recipe.find(name)->obstacle;
+}
+
+std::vector<std::string> namesOf(const Recipe& recipe) {
+  std::vector<std::string> names;
+  for (const Step& s : recipe.steps) names.push_back(s.name);
+  return names;
+}
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+std::string usageError(const Facts& facts, const std::string& name) {
+  try {
+    makeRecipe(facts, {name}, {});
+  } catch (const Error& e) {
+    CHECK(e.code() == ExitCode::Usage);
+    return e.what();
+  }
+  return {};
+}
+
+CaseOptions sized(int width, int height, uint64_t samples = 16) {
+  CaseOptions o;
+  o.width = width;
+  o.height = height;
+  o.samples = samples;
+  return o;
+}
+
+Rgb<float> grey(int width, int height, float value) { return {width, height, value}; }
+
+}  // namespace
+
+TEST_CASE("The exposure scale brings any image to middle grey, whatever its units") {
+  CHECK(exposureScale(grey(40, 30, 1)) == doctest::Approx(0.18));
+  for (const float light : {1e-12f, 1e-6f, 1.0f, 1e6f, 1e12f})
+    CHECK(exposureScale(grey(33, 50, light)) * static_cast<double>(light) == doctest::Approx(0.18).epsilon(1e-6));
+  CHECK(exposureScale(grey(40, 30, 0)) == 1);
+  CHECK(exposureScale({}) == 1);
+  CHECK(exposureScale(grey(1, 1, 2)) == doctest::Approx(0.09));
+  // Two tiles, one four times brighter: the mean of logarithms is their geometric mean. One black: it does not count.
+  Rgb<float> two = grey(32, 16, 1);
+  for (size_t c = 0; c < 3; ++c)
+    for (int y = 0; y < 16; ++y)
+      for (int x = 0; x < 16; ++x) two[c].at(x, y) = 4;
+  CHECK(exposureScale(two) == doctest::Approx(0.09));
+  for (size_t c = 0; c < 3; ++c)
+    for (int y = 0; y < 16; ++y)
+      for (int x = 0; x < 16; ++x) two[c].at(x, y) = 1e-12f;
+  CHECK(exposureScale(two) == doctest::Approx(0.18));
+  // A pixel that is no number counts as black.
+  Rgb<float> bad = grey(16, 16, 1);
+  bad[0].at(3, 3) = std::nanf("");
+  CHECK(exposureScale(bad) == doctest::Approx(0.18 * 256 / 255));
+}
+
+TEST_CASE("Bad values are set to zero and counted") {
+  Estimates e = makeCase(sized(8, 6)).estimates;
+  CHECK(sanitise(e).clean());
+  e.estimates[0].mean[0][3] = kInfinity;
+  e.estimates[0].half[1][2][5] = std::nanf("");
+  e.estimates[1].quarter[2][1][7] = -kInfinity;
+  e.estimates[0].variance[0][0] = -1;
+  e.features->depth.mean[2] = kInfinity;
+  e.features->normal.variance[1][2] = -2;
+  e.history["pt"][1].variance[0][1] = std::nanf("");
+  const SanitiseReport report = sanitise(e);
+  CHECK(report.nonFinite == 5);
+  CHECK(report.negativeVariance == 2);
+  CHECK(e.estimates[0].mean[0][3] == 0);
+  CHECK(e.estimates[0].variance[0][0] == 0);
+  CHECK(sanitise(e).clean());
+  // A negative colour is no error: perturbed images and regressions have them.
+  e.estimates[0].mean[0][3] = -1;
+  CHECK(sanitise(e).clean());
+}
+
+TEST_CASE("Scaling multiplies colours by k and variances by its square, and back") {
+  Estimates e = makeCase(sized(8, 6)).estimates;
+  const Estimates before = e;
+  scaleExposure(e, 4);
+  CHECK(e.estimates[2].mean[1][9] == 4 * before.estimates[2].mean[1][9]);
+  CHECK(e.estimates[2].quarter[3][1][9] == 4 * before.estimates[2].quarter[3][1][9]);
+  CHECK(e.estimates[2].bias[1][9] == 4 * before.estimates[2].bias[1][9]);
+  CHECK(e.estimates[2].variance[1][9] == 16 * before.estimates[2].variance[1][9]);
+  CHECK(e.estimates[2].biasVariance[1][9] == 16 * before.estimates[2].biasVariance[1][9]);
+  CHECK(e.history["pt"][2].variance[1][9] == 16 * before.history.at("pt")[2].variance[1][9]);
+  scaleExposure(e, 0.25);
+  for (size_t i = 0; i < 3; ++i) CHECK(identical(e.estimates[i].variance, before.estimates[i].variance));
+}
+
+TEST_CASE("Estimates fill their roles, and names override the rules") {
+  Facts facts = fullFacts();
+  facts.estimates.push_back({"bdpt", true, Correlation::Independent, 64, true, true, true, 7});
+  const auto step = [&](const std::string& name, RecipeOptions o) {
+    const Recipe recipe = makeRecipe(facts, {name}, o);
+    REQUIRE(recipe.find(name));
+    return *recipe.find(name);
+  };
+  RecipeOptions none;
+  CHECK(step("inverse-variance", none).unbiased == "pt");
+  CHECK(step("inverse-variance", none).biased == "sppm");
+  CHECK(step("inverse-variance", boxes()).biased == "box");
+  CHECK(step("inverse-variance@sppm", boxes()).biased == "sppm");
+  RecipeOptions named;
+  named.unbiased = "bdpt";
+  named.biased = "box";
+  CHECK(step("inverse-variance", named).unbiased == "bdpt");
+  CHECK(step("inverse-variance", named).biased == "box");
+  named.unbiased = "vcm";
+  CHECK(contains(step("inverse-variance", named).obstacle, "vcm, which there is not"));
+  CHECK(step("average", boxes()).bases == std::vector<std::string>{"box", "sppm"});
+  // Whatever is registered: box is for stress tests and stands nowhere by itself.
+  for (const auto& m : makeMethods()) {
+    const Step s = step(m->name(), none);
+    CHECK(s.biased != "box");
+    CHECK(std::count(s.bases.begin(), s.bases.end(), "box") == 0);
+  }
+}
+
+TEST_CASE("Inputs come before the methods that read them, each once") {
+  const Facts facts = fullFacts();
+  using Names = std::vector<std::string>;
+  CHECK(namesOf(makeRecipe(facts, {"average", "inverse-variance@box", "easy@box", "average"}, boxes())) ==
+        Names{"box", "average", "inverse-variance@box", "easy@box"});
+  CHECK(namesOf(makeRecipe(facts, {"inverse-variance@easy@box"}, {})) ==
+        Names{"box", "easy@box", "inverse-variance@easy@box"});
+  RecipeOptions chained = boxes();
+  chained.biased = "easy";
+  CHECK(namesOf(makeRecipe(facts, {"inverse-variance"}, chained)) == Names{"box", "easy", "inverse-variance"});
+  // The named input gets the default one itself, and no method becomes its own input.
+  chained.biased = "inverse-variance";
+  const Recipe self = makeRecipe(facts, {"inverse-variance"}, chained);
+  CHECK(self.find("inverse-variance")->biased == "box");
+  RecipeOptions loop;
+  loop.bases = {"average", "sppm"};
+  CHECK(contains(obstacleOf(facts, "average", loop), "its own input"));
+}
+
+TEST_CASE("A method goes before an estimate of its name") {
+  Case c = makeCase(sized(16, 12));
+  Estimate stale = c.find("wide");
+  stale.name = "box";
+  c.estimates.estimates.push_back(stale);
+  const PipelineResult r = runPipeline(c.estimates, {"inverse-variance@box", "box"}, {});
+  REQUIRE(r.find("box"));
+  CHECK(std::sqrt(meanSquaredError(r.find("box")->result.image.mean, detail::boxFilter(c.pt().mean, 7))) < 1e-6);
+}
+
+TEST_CASE("What cannot run names what is missing, for every registered method") {
+  for (const auto& m : makeMethods()) {
+    const std::string name = m->name();
+    const auto* outside = dynamic_cast<const OutsideMethod*>(m.get());
+    if (outside && !outside->obstacle().empty()) {
+      CHECK(obstacleOf(fullFacts(), name) == outside->obstacle());
+      continue;
+    }
+    CAPTURE(name);
+    CHECK(obstacleOf(fullFacts(), name) == "");
+    const Needs needs = m->needs();
+    const auto without = [&](auto change) {
+      Facts facts = fullFacts();
+      change(facts);
+      return obstacleOf(facts, name);
+    };
+    const auto expect = [&](bool needed, const std::string& obstacle, const char* word) {
+      if (needed)
+        CHECK_MESSAGE(contains(obstacle, word), obstacle);
+      else
+        CHECK(obstacle == "");
+    };
+    expect(true, without([](Facts& f) { f.estimates.erase(f.estimates.begin()); }), "unbiased estimate");
+    expect(needs.halves, without([](Facts& f) { f.estimates[0].halves = false; }), "halves of pt");
+    expect(needs.variance, without([](Facts& f) { f.estimates[0].variance = false; }), "variance of pt");
+    expect(needs.quarters, without([](Facts& f) { f.estimates[0].quarters = false; }), "quarter buffers of pt");
+    expect(needs.correlated, without([](Facts& f) { f.estimates.erase(f.estimates.begin() + 1); }), "correlated");
+    if (needs.checkpoints > 0) expect(true, without([](Facts& f) { f.estimates[0].checkpoints = 0; }), "checkpoint");
+    if (needs.passes > 1)
+      expect(true, without([&](Facts& f) { f.estimates[0].passes = needs.passes - 1; }), "passes of pt");
+    // Without passes being known, as from files, the halves have the word.
+    expect(false, without([](Facts& f) { f.estimates[0].passes = 0; }), "");
+  }
+  Facts facts = fullFacts();
+  facts.estimates[2].halves = false;
+  CHECK(contains(obstacleOf(facts, "inverse-variance@sppm"), "halves of sppm"));
+  CHECK(contains(obstacleOf(facts, "easy@sppm"), "sppm is none"));
+  CHECK(contains(obstacleOf(facts, "box@sppm"), "takes no biased input"));
+  RecipeOptions few;
+  few.bases = {"box"};
+  CHECK(contains(obstacleOf(facts, "average", few), "needs 2 bases"));
+  CHECK(contains(obstacleOf(facts, "inverse-variance@external:none.exr"), "none.exr: no such file"));
+}
+
+TEST_CASE("An unknown name is a usage error that lists the known ones") {
+  for (const char* name : {"jss", "inverse-variance@jss", "easy@easy@jss"}) {
+    const std::string text = usageError(fullFacts(), name);
+    CHECK(contains(text, "'jss'"));
+    for (const auto& m : makeMethods()) CHECK(contains(text, m->name()));
+  }
+  CHECK(contains(usageError(fullFacts(), "box:3"), "takes no parameter"));
+  CHECK(contains(usageError(fullFacts(), "external:a.exr:b.exr"), "external:FILE:HALFA:HALFB"));
+}
+
+TEST_CASE("What must be kept during a render is the union of what the steps need") {
+  CHECK_FALSE(needsOf(makeRecipe(fullFacts(), {"box"}, {})).quarters);
+  for (const auto& m : makeMethods()) {
+    const Recipe recipe = makeRecipe(fullFacts(), {m->name()}, boxes());
+    if (!recipe.find(m->name())->obstacle.empty()) continue;
+    const RecipeNeeds all = needsOf(recipe);
+    CHECK(all.quarters >= m->needs().quarters);
+    CHECK(all.features >= m->needs().features);
+    CHECK(all.checkpoints >= m->needs().checkpoints);
+  }
+}
+
+TEST_CASE("Results are in the units of the estimates and are estimates themselves") {
+  CaseOptions o = sized(40, 30);
+  o.light = 1000;
+  const Case c = makeCase(o);
+  PipelineOptions options;
+  const PipelineResult r = runPipeline(c.estimates, {"box", "inverse-variance@box"}, options);
+  CHECK(r.exposure == doctest::Approx(exposureScale(c.pt().mean)));
+  REQUIRE(r.find("box"));
+  const Estimate& box = r.find("box")->result.image;
+  CHECK(box.name == "box");
+  CHECK_FALSE(box.unbiased);
+  CHECK(box.passes == 16);
+  const Rgb<float> expected = detail::boxFilter(c.pt().mean, 7);
+  CHECK(std::sqrt(meanSquaredError(box.mean, expected)) < 1e-6 * meanOfImage(expected));
+  CHECK(std::sqrt(meanSquaredError(box.half[1], detail::boxFilter(c.pt().half[1], 7))) < 1e-6 * meanOfImage(expected));
+  // The error map too: it is of the size of the squared error, light squared.
+  const PipelineOutput& blend = *r.find("inverse-variance@box");
+  double error = 0;
+  for (const float v : blend.result.error.data) error += static_cast<double>(v) / 1200;
+  const double actual = meanSquaredError(blend.result.image.mean, c.truth);
+  CHECK(error > 0.3 * actual);
+  CHECK(error < 3 * actual);
+  // A series of checkpoints keeps its exposure.
+  options.exposure = 0.5;
+  CHECK(runPipeline(c.estimates, {"box"}, options).exposure == 0.5);
+}
+
+TEST_CASE("Seconds of inputs are counted once") {
+  const Case c = makeCase(sized(64, 48));
+  const PipelineResult r =
+      runPipeline(c.estimates, {"average", "inverse-variance@easy@box"}, {boxes(), {}, 0, nullptr});
+  const double box = r.find("box")->seconds, easy = r.find("easy@box")->seconds;
+  CHECK(box > 0);
+  CHECK(r.find("box")->inputSeconds == 0);
+  CHECK(r.find("average")->inputSeconds == box);
+  CHECK(r.find("easy@box")->inputSeconds == box);
+  CHECK(r.find("inverse-variance@easy@box")->inputSeconds == doctest::Approx(box + easy));
+}
+
+TEST_CASE("Estimates whose planes differ in size are refused") {
+  Case c = makeCase(sized(16, 12));
+  c.estimates.estimates[0].half[0] = Rgb<float>(15, 12);
+  CHECK_THROWS_AS(runPipeline(c.estimates, {"box"}, {}), Error);
+}
+
+TEST_CASE("Names of layers have no dots and no folders") {
+  CHECK(layerName("js") == "js");
+  CHECK(layerName("js@easy@nfor") == "js@easy@nfor");
+  CHECK(layerName("external:/a/b/kpcn.out.exr:x.exr:y.exr") == "external-kpcn-out");
+}

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which integrators `auto` keeps: measured, with a reason for every one that is left out.
+#include <doctest/doctest.h>
+
+#include "renderer/scene/gltf.h"
+#include "tests/render_fixture.h"
+
+using namespace braid;
+using namespace braid::test;
+
+namespace {
+
+std::vector<std::string> kept(const Scene& scene) {
+  Settings settings = settingsFor(128, 72, 1);
+  settings.integrators = {"auto"};
+  const Plan plan = makePlan(scene, scene.data().cameras.at(0), settings, integrators());
+  std::vector<std::string> names;
+  for (const PlannedIntegrator& p : plan.integrators) names.push_back(p.integrator->name());
+  for (const Integrator* i : integrators()) {
+    bool explained = false;
+    for (const PlanLine& line : plan.lines)
+      explained = explained || (line.subject == i->name() && line.reason.size() > 10);
+    CHECK_MESSAGE(explained, i->name());
+  }
+  return names;
+}
+
+std::vector<std::string> keptOf(const char* name) {
+  return kept(Scene(loadGltf(sourcePath("scenes/" + std::string(name) + ".glb"))));
+}
+
+}  // namespace
+
+TEST_CASE("auto leaves photons and light subpaths out where camera paths find all light") {
+  for (const char* name : {"cornell", "plates", "interior", "hair", "foliage", "sun_sky", "forest", "bookshelf"}) {
+    CAPTURE(std::string(name));
+    CHECK(keptOf(name) == std::vector<std::string>{"pt"});
+  }
+}
+
+TEST_CASE("auto keeps photons and light subpaths for caustics of small lamps and for hidden lights") {
+  for (const char* name : {"pool", "torus_glass", "glass_of_water", "materials", "door_ajar", "many_lights"}) {
+    CAPTURE(std::string(name));
+    CHECK(keptOf(name) == std::vector<std::string>{"sppm", "bdpt"});
+  }
+}
+
+TEST_CASE("auto renders what it keeps: the headline is the photon map's, the shares are in the plan") {
+  const Scene scene(loadGltf(sourcePath("scenes/torus_glass.glb")));
+  Settings settings = settingsFor(32, 18, 4);
+  settings.integrators = {"auto"};
+  const Plan plan = makePlan(scene, scene.data().cameras.at(0), settings, integrators());
+  CHECK(plan.text().find("passes of a round: sppm 1, bdpt 1") != std::string::npos);
+  const RenderResult r = Session(scene, plan).run();
+  REQUIRE(r.estimates->estimates.size() == 2);
+  CHECK(r.estimates->estimates[0].name == "sppm");
+  CHECK(r.estimates->estimates[1].passes == 4);
+  CHECK(sameBits(r.image, r.estimates->estimates[0].mean));
+}

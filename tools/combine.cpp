@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+// `braid combine`: denoisers and combiners on the images of earlier renders, braid's or another renderer's.
+#include <algorithm>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "combiners/registry.h"
+#include "renderer/core/error.h"
+#include "renderer/film/exr.h"
+#include "tools/cli.h"
+#include "tools/combining.h"
+#include "tools/estimates_file.h"
+#include "tools/output_options.h"
+#include "version.h"
+
+namespace braid {
+
+namespace {
+
+struct CombineOptions {
+  std::string unbiased, correlated, output, png, aovs = "all";
+  CombineChoice choice;
+  uint64_t samplesPerPixel = 0;
+  double exposure = 0;
+  int threads = 0;
+  bool quarters = false, floatHeadline = false, noTiming = false, quiet = false;
+};
+
+bool isFile(const std::string& text) {
+  std::error_code ignored;
+  const std::string first = text.substr(0, text.find(','));
+  return std::filesystem::is_regular_file(first, ignored) ||
+         std::filesystem::is_regular_file(first.substr(0, first.rfind(':')), ignored);
+}
+
+bool looksLikeFile(const std::string& text) { return text.find('.') != std::string::npos || isFile(text); }
+
+// Adds the first estimate of `from` that fits, or else the very first, under a name that is free. Returns the name.
+template <class Fits>
+std::string addEstimate(Estimates& all, Estimates from, const std::string& file, const Fits& fits) {
+  if (from.width != all.width || from.height != all.height)
+    throw Error(ExitCode::BadInput, fmt::format("{}: {}x{} pixels, but the unbiased image has {}x{}", file, from.width,
+                                                from.height, all.width, all.height));
+  auto found = std::find_if(from.estimates.begin(), from.estimates.end(), fits);
+  if (found == from.estimates.end() || file.find(':') != std::string::npos) found = from.estimates.begin();
+  while (all.find(found->name) || isMethod(found->name)) found->name += "-file";
+  all.estimates.push_back(std::move(*found));
+  return all.estimates.back().name;
+}
+
+// A braid file as the biased input stands for its headline where it has no biased estimate: a combined image.
+Estimates readBiased(const std::string& text, const ReadOptions& options) {
+  Estimates all = readEstimatesOption(text, options);
+  if (text.find(',') != std::string::npos || text.find(':') != std::string::npos) return all;
+  const ImageFile file = readImage(text);
+  const bool any =
+      std::any_of(all.estimates.begin(), all.estimates.end(), [](const Estimate& e) { return !e.unbiased; });
+  if (any || !hasLayer(file, "")) return all;
+  Estimate headline;
+  headline.name = options.foreignName;
+  headline.mean = file.rgb("");
+  all.estimates = {std::move(headline)};
+  return all;
+}
+
+// Fills the roles of the pipeline from the options; files become estimates.
+Estimates readInputs(const CombineOptions& o, PipelineOptions& pipeline, std::vector<std::string>& notes) {
+  ReadOptions read{"unbiased", ImageRole::Noisy, o.samplesPerPixel, &notes};
+  Estimates all = readEstimatesOption(o.unbiased, read);
+  const auto independent = std::find_if(all.estimates.begin(), all.estimates.end(), [](const Estimate& e) {
+    return e.unbiased && e.correlation == Correlation::Independent;
+  });
+  if (independent == all.estimates.end())
+    throw Error(ExitCode::BadInput,
+                fmt::format("{}: holds no unbiased estimate with independent pixels, such as pt", o.unbiased));
+  pipeline.roles.unbiased = independent->name;
+  if (!o.correlated.empty()) {
+    read.foreignName = "correlated";
+    pipeline.roles.correlated =
+        addEstimate(all, readEstimatesOption(o.correlated, read), o.correlated,
+                    [](const Estimate& e) { return e.correlation != Correlation::Independent; });
+    Estimate& e = all.estimates.back();
+    if (e.correlation == Correlation::Independent) e.correlation = Correlation::CommonRandomNumbers;
+  }
+  const std::string& biased = o.choice.biased;
+  if (!biased.empty() && !all.find(biased) && !isMethod(biased) && looksLikeFile(biased) &&
+      biased.rfind("external:", 0) != 0) {
+    read.foreignName = "biased";
+    read.role = ImageRole::Denoised;
+    pipeline.roles.biased =
+        addEstimate(all, readBiased(biased, read), biased, [](const Estimate& e) { return !e.unbiased; });
+    all.estimates.back().unbiased = false;
+  }
+  for (std::string& base : pipeline.roles.bases)
+    if (!all.find(base) && base.find(':') == std::string::npos && isFile(base)) base = "external:" + base;
+  return all;
+}
+
+// Names of what would run on these inputs, for a user whose choice does not.
+std::string runnable(const Estimates& all, const RecipeOptions& roles) {
+  std::string names;
+  for (const auto& m : makeMethods()) {
+    const Recipe recipe = makeRecipe(factsOf(all), {m->name()}, roles);
+    if (const Step* step = recipe.find(m->name()); step && step->obstacle.empty())
+      names += fmt::format("{}{}", names.empty() ? "" : ", ", m->name());
+  }
+  return names.empty() ? "; nothing can run on these files" : "; what can run on these files: " + names;
+}
+
+int runCombine(const CombineOptions& o) {
+  const AovSet aovs = parseAovs(o.aovs);
+  checkWritable(o.output);
+  if (!o.png.empty()) checkWritable(o.png);
+  const std::vector<std::string> wanted = o.choice.wanted();
+  if (wanted.empty()) throw Error(ExitCode::Usage, "--method: name at least one method (braid --list)");
+  for (const std::string& name : wanted) makeRecipe({}, {name}, {});  // unknown names first
+  PipelineOptions pipeline = o.choice.options();
+  std::vector<std::string> notes;
+  Estimates all = readInputs(o, pipeline, notes);
+  if (!o.quiet)
+    for (const std::string& line : notes) fmt::print(stderr, "note: {}\n", line);
+
+  const Facts facts = factsOf(all);
+  const Recipe recipe = makeRecipe(facts, wanted, pipeline.roles);
+  for (const std::string& name : wanted)
+    if (const Step* step = recipe.find(name); step && !step->obstacle.empty())
+      throw Error(ExitCode::BadInput,
+                  fmt::format("{} cannot run: {}{}", name, step->obstacle, runnable(all, pipeline.roles)));
+  const PipelineResult result = runCombining(all, o.choice, pipeline, o.threads);
+  for (const std::string& name : wanted)
+    if (const PipelineOutput* out = result.find(name); out && !out->ran())
+      throw Error(ExitCode::BadInput, fmt::format("{} cannot run: {}", name, out->step.obstacle));
+
+  const Attribute version{"Software", Attribute::Kind::String, std::string("braid ") + BRAID_VERSION, 0, 0, {}};
+  all.attributes = estimateAttributes(all, !o.noTiming);
+  all.attributes.insert(all.attributes.begin(), version);
+  const CombinedLayers combined(result, wanted, o.choice.weights, !o.noTiming, all);
+  BRAID_ASSERT(combined.headline());
+  ExrOptions exr;
+  exr.aovs = aovs;
+  exr.quarters = o.quarters;
+  exr.floatHeadline = o.floatHeadline;
+  exr.layers = combined.layers();
+  const WriteReport report = writeExr(o.output, all, *combined.headline(), nullptr, exr);
+  if (!o.png.empty()) writePng(o.png, *combined.headline(), static_cast<float>(o.exposure));
+  if (o.quiet) return 0;
+  for (const std::string& line : combineWarnings(result)) fmt::print(stderr, "warning: {}\n", line);
+  if (report.clampedToHalf > 0)
+    fmt::print(stderr, "warning: {}: {} values above 65504 were clamped to fit half floats: use --float\n", o.output,
+               report.clampedToHalf);
+  fmt::print(stderr, "{}", recipeText(recipe));
+  for (const PipelineOutput& out : result.outputs)
+    if (out.ran())
+      fmt::print(stderr, "{}: {:.3f} s, its inputs {:.3f} s\n", out.step.name, out.seconds, out.inputSeconds);
+  fmt::print(stderr, "Saved: {}\n", o.output);
+  return 0;
+}
+
+}  // namespace
+
+void addCombine(CLI::App& app, Action& action) {
+  auto options = std::make_shared<CombineOptions>();
+  CombineOptions& o = *options;
+  CLI::App* command = app.add_subcommand("combine", "Denoise or combine the images of earlier renders");
+  command
+      ->add_option("--unbiased", o.unbiased,
+                   "FILE, or FILE:ESTIMATE of braid's; HALFA,HALFB: two renders with different seeds; or "
+                   "FILE,HALFA,HALFB")
+      ->required();
+  command->add_option("--correlated", o.correlated, "The same, for the estimate by common random numbers or gradients");
+  command
+      ->add_option("--method", o.choice.combine, "Methods to run, separated by commas; the last one is the image R G B")
+      ->required();
+  command->add_option("-o,--output", o.output, "EXR file to write")->required();
+  addCombineOptions(*command, o.choice);
+  command->get_option("--biased")
+      ->description("Biased input: a file as for --unbiased, an estimate, a denoiser or another combiner");
+  command->add_option("--spp", o.samplesPerPixel,
+                      "Samples per pixel of the unbiased image, where its file does not say");
+  command->add_option("--png", o.png, "Also write a tone-mapped PNG");
+  command->add_option("--exposure", o.exposure, "Exposure of the PNG in stops")->capture_default_str();
+  command->add_option("--aovs", o.aovs, "Layers besides the image: none, features or all")->capture_default_str();
+  command->add_flag("--quarters", o.quarters, "Also write the four quarter buffers");
+  command->add_flag("--float", o.floatHeadline, "R G B as 32-bit floats");
+  command->add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
+  command->add_option("--threads", o.threads, "Worker threads (default: all)")->check(CLI::Range(0, 4096));
+  command->add_flag("-q,--quiet", o.quiet, "Errors only");
+  command->footer(methodList() +
+                  "METHOD@INPUT chooses the biased input of one method, e.g. js@ensemble.\n"
+                  "Examples:\n"
+                  "  braid combine --unbiased out.exr --method js -o js.exr\n"
+                  "  braid combine --unbiased out.exr --method js --biased ensemble --bases nfor,nlm -o js.exr\n"
+                  "  braid combine --unbiased seed1.exr,seed2.exr --biased denoised.exr --method average -o a.exr\n"
+                  "Files of pbrt, Mitsuba 3 and Cycles are read by their channel names.");
+  command->callback([options, &action] { action = [options] { return runCombine(*options); }; });
+}
+
+}  // namespace braid

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/combining.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+#include <tbb/task_arena.h>
+
+#include "combiners/registry.h"
+#include "renderer/core/error.h"
+#include "tools/cli.h"
+
+namespace braid {
+
+namespace {
+
+std::string join(const std::vector<std::string>& names) {
+  std::string text;
+  for (size_t i = 0; i < names.size(); ++i) text += (i == 0 ? "" : i + 1 == names.size() ? " and " : ", ") + names[i];
+  return text;
+}
+
+// What is known of an integrator's estimate before the render. Without a limit of rounds there will be enough of them.
+EstimateFacts plannedEstimate(const PlannedIntegrator& p, uint64_t rounds) {
+  const uint64_t passes = rounds * static_cast<uint64_t>(p.passesPerRound);
+  const int checkpoints = rounds == 0 ? 64 : static_cast<int>(std::bit_width(rounds));  // after the rounds 1, 2, 4, ...
+  return {p.integrator->name(),
+          p.integrator->unbiased(),
+          p.integrator->correlation(),
+          passes,
+          true,
+          true,
+          passes == 0 || passes >= 4,
+          checkpoints};
+}
+
+}  // namespace
+
+std::vector<std::string> CombineChoice::wanted() const {
+  return combine == "none" ? std::vector<std::string>{} : splitList(combine);
+}
+
+PipelineOptions CombineChoice::options(const std::atomic<bool>* cancel) const {
+  PipelineOptions o;
+  o.roles.biased = biased;
+  o.roles.bases = splitList(bases);
+  o.roles.denoisers = splitList(denoisers);
+  o.cancel = cancel;
+  const std::vector<OptionInfo> infos = allMethodOptions();
+  for (size_t i = 0; i < numbers.size() && i < infos.size(); ++i)
+    if (!std::isnan(numbers[i])) o.numbers.set(infos[i].name, numbers[i]);
+  return o;
+}
+
+void addCombineOptions(CLI::App& command, CombineChoice& c) {
+  command.add_option("--denoiser", c.denoisers,
+                     "Denoisers to run and keep, separated by commas, the preferred one first");
+  command.add_option("--biased", c.biased,
+                     "Biased input of combiners: an estimate, a denoiser or another combiner (--list)");
+  command.add_option("--bases", c.bases, "Images that ensembles choose from, by name, separated by commas");
+  command.add_flag("--weights", c.weights, "Also write the maps of weights that combiners worked out");
+  const std::vector<OptionInfo> infos = allMethodOptions();
+  c.numbers.assign(infos.size(), std::numeric_limits<double>::quiet_NaN());
+  for (size_t i = 0; i < infos.size(); ++i)
+    command
+        .add_option_function<double>(
+            "--" + infos[i].name, [&c, i](const double& value) { c.numbers[i] = value; },
+            fmt::format("{} (default {})", infos[i].description, infos[i].fallback))
+        ->group("Options of methods");
+}
+
+std::string methodList() {
+  std::string text;
+  for (const auto& [kind, title] :
+       {std::pair(MethodKind::Denoiser, "Denoisers"), {MethodKind::Combiner, "Combiners"}}) {
+    text += fmt::format("{}:\n", title);
+    for (const auto& m : makeMethods())
+      if (m->kind() == kind) text += fmt::format("  {:<18} {}\n", m->name(), m->description());
+  }
+  return text;
+}
+
+Recipe planCombining(const Scene& scene, const CameraData& camera, Settings& settings,
+                     const std::vector<const Integrator*>& integrators, const CombineChoice& choice) {
+  if (choice.wanted().empty() && choice.denoisers.empty()) return {};
+  // By what could be kept, what has to be: quarters and history are of no use elsewhere.
+  Facts facts;
+  facts.features = true;
+  for (const PlannedIntegrator& p : makePlan(scene, camera, settings, integrators).integrators)
+    facts.estimates.push_back(plannedEstimate(p, settings.spp));
+  Recipe recipe = makeRecipe(facts, choice.wanted(), choice.options().roles);
+  const RecipeNeeds needs = needsOf(recipe);
+  settings.quarters |= needs.quarters;
+  settings.features |= needs.features;
+  settings.history |= needs.checkpoints > 0;
+  return recipe;
+}
+
+std::string recipeText(const Recipe& recipe) {
+  std::string text;
+  for (const Step& s : recipe.steps) {
+    if (!s.obstacle.empty()) {
+      text += fmt::format("- {}: {}\n", s.name, s.obstacle);
+      continue;
+    }
+    std::vector<std::string> inputs{s.unbiased};
+    for (const std::string& name : {s.correlated, s.biased})
+      if (!name.empty()) inputs.push_back(name);
+    inputs.insert(inputs.end(), s.bases.begin(), s.bases.end());
+    text += fmt::format("+ {}: of {}\n", s.name, join(inputs));
+  }
+  return text;
+}
+
+PipelineResult runCombining(const Estimates& estimates, const CombineChoice& choice, const PipelineOptions& options,
+                            int threads) {
+  if (choice.wanted().empty() && choice.denoisers.empty()) return {};
+  tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
+  return arena.execute([&] { return runPipeline(estimates, choice.wanted(), options); });
+}
+
+void requireRunnable(const Recipe& recipe, const std::vector<std::string>& wanted) {
+  for (const std::string& name : wanted)
+    if (const Step* step = recipe.find(name); step && !step->obstacle.empty())
+      throw Error(ExitCode::Usage, fmt::format("{} cannot run: {}", name, step->obstacle));
+}
+
+CombinedLayers::CombinedLayers(const PipelineResult& result, const std::vector<std::string>& wanted, bool weights,
+                               bool timing, Estimates& estimates) {
+  const PipelineOutput* last = nullptr;
+  for (const PipelineOutput& out : result.outputs) {
+    if (!out.ran()) continue;
+    const std::vector<Attribute> remarks = remarksOf(out, timing);
+    estimates.attributes.insert(estimates.attributes.end(), remarks.begin(), remarks.end());
+    if (out.step.method->kind() == MethodKind::Denoiser) {
+      Estimate e = out.result.image;
+      e.name = layerName(out.step.name);
+      std::erase_if(estimates.estimates, [&](const Estimate& old) { return old.name == e.name; });
+      const std::string prefix = "braid/" + e.name + "/";
+      std::erase_if(estimates.attributes,
+                    [&](const Attribute& a) { return a.name == prefix + "unbiased" || a.name == prefix + "passes"; });
+      estimates.attributes.push_back({prefix + "unbiased", Attribute::Kind::Int, "", 0, 0, {}});
+      estimates.attributes.push_back(
+          {prefix + "passes", Attribute::Kind::Int, "", static_cast<int64_t>(e.passes), 0, {}});
+      estimates.estimates.push_back(std::move(e));
+    }
+    if (weights)
+      for (const NamedPlane& p : out.result.aovs) add(p.name, p.plane);
+  }
+  for (const std::string& name : wanted) {
+    const PipelineOutput* out = result.find(name);
+    if (!out || !out->ran()) continue;
+    last = out;
+    const std::string layer = "combined." + layerName(name);
+    if (std::none_of(list_.begin(), list_.end(), [&](const Layer& l) { return l.name == layer; }))
+      list_.push_back({layer, &out->result.image.mean, nullptr});
+  }
+  if (!last) return;
+  headline_ = &last->result.image.mean;
+  if (!last->result.error.empty()) add("Error", last->result.error);
+  estimates.attributes.push_back(
+      {"braid/headline", Attribute::Kind::String, "combined." + layerName(last->step.name), 0, 0, {}});
+  estimates.attributes.push_back({"braid/exposure", Attribute::Kind::Float, "", 0, result.exposure, {}});
+}
+
+void CombinedLayers::add(const std::string& name, const Plane<float>& plane) {
+  for (const Layer& l : list_)
+    if (l.name == name) return;
+  auto image = std::make_unique<Rgb<float>>();
+  for (Plane<float>& p : image->channel) p = plane;
+  const Rgb<float>* pointer = image.get();
+  list_.push_back({name, pointer, std::move(image)});
+}
+
+std::vector<ExrLayer> CombinedLayers::layers() const {
+  std::vector<ExrLayer> layers;
+  for (const Layer& l : list_) layers.push_back({l.name, l.image});
+  return layers;
+}
+
+std::vector<std::string> combineWarnings(const PipelineResult& result) {
+  std::vector<std::string> lines;
+  const SanitiseReport& s = result.sanitised;
+  if (!s.clean())
+    lines.push_back(
+        fmt::format("inputs of combiners: {} values that were not finite and {} negative variances count as "
+                    "0, {} values were limited",
+                    s.nonFinite, s.negativeVariance, s.outOfRange));
+  for (const PipelineOutput& out : result.outputs)
+    if (!out.ran()) lines.push_back(fmt::format("{} did not run: {}", out.step.name, out.step.obstacle));
+  return lines;
+}
+
+}  // namespace braid

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// Denoisers and combiners on the command line: the options that name them, and what their results add to a file.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "combiners/pipeline.h"
+#include "renderer/film/exr.h"
+#include "renderer/session/integrator.h"
+#include "renderer/session/plan.h"
+
+namespace braid {
+
+// What `braid render` combines when nothing is said.
+inline constexpr const char* kDefaultCombine = "none";
+
+struct CombineChoice {
+  std::string combine = kDefaultCombine;  // none, or names separated by commas; the last one is the headline
+  std::string denoisers, biased, bases;
+  bool weights = false;  // also write the maps of weights
+  // Values of method options, in the order of allMethodOptions(); not a number: the default.
+  std::vector<double> numbers;
+
+  std::vector<std::string> wanted() const;
+  PipelineOptions options(const std::atomic<bool>* cancel = nullptr) const;
+};
+
+// --denoiser, --biased, --bases, --weights and the options of every registered method.
+void addCombineOptions(CLI::App& command, CombineChoice& choice);
+// One line a method for the help of commands.
+std::string methodList();
+
+// The steps that will run after a render with these settings; the settings get what the steps need to be kept:
+// quarters, features, history. Throws Error(Usage) for unknown names.
+Recipe planCombining(const Scene& scene, const CameraData& camera, Settings& settings,
+                     const std::vector<const Integrator*>& integrators, const CombineChoice& choice);
+
+// "+ js: of pt and nfor" or "- curves: needs 3 checkpoints of pt, which has 2", a line for each step.
+std::string recipeText(const Recipe& recipe);
+
+// Runs the choice on the estimates; nothing to run is an empty result. `threads` 0: all that the process may use.
+PipelineResult runCombining(const Estimates& estimates, const CombineChoice& choice, const PipelineOptions& options,
+                            int threads);
+
+// Throws Error(Usage) with a sentence when one of the wanted methods cannot run.
+void requireRunnable(const Recipe& recipe, const std::vector<std::string>& wanted);
+
+// What methods made, in the form that files hold.
+class CombinedLayers {
+ public:
+  // Appends the denoisers' estimates and the header's remarks to `estimates`. `result` must outlive this.
+  CombinedLayers(const PipelineResult& result, const std::vector<std::string>& wanted, bool weights, bool timing,
+                 Estimates& estimates);
+  // combined.<method>, Error and the weights.
+  std::vector<ExrLayer> layers() const;
+  // The image of the last wanted method that ran; null: none did.
+  const Rgb<float>* headline() const { return headline_; }
+
+ private:
+  struct Layer {
+    std::string name;
+    const Rgb<float>* image = nullptr;
+    std::unique_ptr<Rgb<float>> owned;
+  };
+  void add(const std::string& name, const Plane<float>& plane);
+
+  std::vector<Layer> list_;
+  const Rgb<float>* headline_ = nullptr;
+};
+
+// Lines about bad input values and methods that did not run.
+std::vector<std::string> combineWarnings(const PipelineResult& result);
+
+}  // namespace braid

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/estimates_file.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "renderer/core/error.h"
+#include "renderer/core/parallel.h"
+#include "tools/foreign_image.h"
+
+namespace braid {
+
+namespace {
+
+const char* toString(Correlation c) {
+  return c == Correlation::Independent ? "independent"
+         : c == Correlation::Gradients ? "gradients"
+                                       : "common random numbers";
+}
+
+const Attribute* find(const ImageFile& file, const std::string& name) {
+  for (const Attribute& a : file.attributes)
+    if (a.name == name) return &a;
+  return nullptr;
+}
+
+// Integers beyond 32 bits are kept as text.
+int64_t integerOr(const ImageFile& file, const std::string& name, int64_t fallback) {
+  const Attribute* a = find(file, name);
+  if (!a) return fallback;
+  return a->kind == Attribute::Kind::String ? std::atoll(a->text.c_str()) : a->integer;
+}
+
+Rgb<float> layerOrNone(const ImageFile& file, const std::string& layer) {
+  return hasLayer(file, layer) ? file.rgb(layer) : Rgb<float>();
+}
+
+// "<prefix>pt" for every layer "<prefix>pt.mean".
+std::vector<std::string> estimateNames(const ImageFile& file) {
+  std::vector<std::string> names;
+  const std::string ending = ".mean.R";
+  for (const std::string& channel : file.channelNames)
+    if (channel.size() > ending.size() && channel.ends_with(ending))
+      names.push_back(channel.substr(0, channel.size() - ending.size()));
+  return names;
+}
+
+// The variances after 1, 2, 4, … passes, from layers <name>.variance<passes>.
+std::vector<Checkpoint> readHistory(const ImageFile& file, const std::string& layer, double secondsPerPass) {
+  std::vector<Checkpoint> history;
+  for (uint64_t passes = 1; passes < uint64_t(1) << 40; passes *= 2) {
+    Rgb<float> variance = layerOrNone(file, layer + ".variance" + std::to_string(passes));
+    if (!variance.empty())
+      history.push_back({passes, secondsPerPass * static_cast<double>(passes), std::move(variance)});
+  }
+  return history;
+}
+
+Estimate readEstimate(const ImageFile& file, const std::string& layer, const std::string& name) {
+  Estimate e;
+  e.name = name;
+  e.mean = file.rgb(layer + ".mean");
+  e.half[0] = layerOrNone(file, layer + ".halfA");
+  e.half[1] = layerOrNone(file, layer + ".halfB");
+  e.variance = layerOrNone(file, layer + ".variance");
+  e.bias = layerOrNone(file, layer + ".bias");
+  e.biasVariance = layerOrNone(file, layer + ".biasVariance");
+  for (int q = 0; q < 4; ++q)
+    if (const std::string quarter = layer + ".q" + std::to_string(q); hasLayer(file, quarter))
+      e.quarter.push_back(file.rgb(quarter));
+  const std::string prefix = "braid/" + name + "/";
+  e.unbiased = integerOr(file, prefix + "unbiased", 1) != 0;
+  e.passes = static_cast<uint64_t>(std::max<int64_t>(0, integerOr(file, prefix + "passes", 0)));
+  if (const Attribute* seconds = find(file, prefix + "seconds")) e.seconds = seconds->number;
+  if (const Attribute* correlation = find(file, prefix + "correlation"))
+    for (const Correlation c : {Correlation::CommonRandomNumbers, Correlation::Gradients})
+      if (correlation->text == toString(c)) e.correlation = c;
+  return e;
+}
+
+FeaturePlanes<Rgb<float>> readFeature(const ImageFile& file, const std::string& layer) {
+  return {layerOrNone(file, layer),
+          {layerOrNone(file, layer + "A"), layerOrNone(file, layer + "B")},
+          layerOrNone(file, layer + "Variance")};
+}
+
+FeaturePlanes<Plane<float>> firstPlanes(FeaturePlanes<Rgb<float>> f) {
+  return {std::move(f.mean[0]), {std::move(f.half[0][0]), std::move(f.half[1][0])}, std::move(f.variance[0])};
+}
+
+Estimates emptyLike(const ImageFile& file) {
+  Estimates all;
+  all.width = file.width;
+  all.height = file.height;
+  all.window = file.window;
+  all.fullWidth = file.fullWidth;
+  all.fullHeight = file.fullHeight;
+  return all;
+}
+
+Estimates readBraid(const ImageFile& file, const std::vector<std::string>& layers) {
+  Estimates all = emptyLike(file);
+  all.seed = static_cast<uint64_t>(integerOr(file, "braid/seed", 0));
+  std::string prefix;
+  for (const std::string& layer : layers) {
+    const size_t dot = layer.rfind('.');
+    if (dot != std::string::npos) prefix = layer.substr(0, dot + 1);
+    const Estimate e = readEstimate(file, layer, dot == std::string::npos ? layer : layer.substr(dot + 1));
+    const double secondsPerPass = e.passes > 0 ? e.seconds / static_cast<double>(e.passes) : 0.0;
+    std::vector<Checkpoint> history = readHistory(file, layer, secondsPerPass);
+    if (!history.empty()) all.history[e.name] = std::move(history);
+    all.estimates.push_back(e);
+  }
+  Features f{readFeature(file, prefix + "Albedo"), readFeature(file, prefix + "N"),
+             firstPlanes(readFeature(file, prefix + "Depth")), firstPlanes(readFeature(file, prefix + "Visibility"))};
+  if (completeFeatures(f, file.width, file.height)) all.features = std::move(f);
+  return all;
+}
+
+bool complete(const Rgb<float> (&half)[2]) { return !half[0].empty() && !half[1].empty(); }
+
+void varianceFromHalves(Estimate& e, const std::string& file, std::vector<std::string>* notes) {
+  if (!e.variance.empty() || !complete(e.half)) return;
+  e.variance = Rgb<float>(e.mean.width(), e.mean.height());
+  for (size_t c = 0; c < 3; ++c)
+    parallelChunks(e.variance.size(), 4096, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) e.variance[c][i] = 0.25f * sqr(e.half[0][c][i] - e.half[1][c][i]);
+    });
+  if (notes) notes->push_back(fmt::format("{}: no variance: taken from the difference of the halves", file));
+}
+
+std::vector<std::string> splitFiles(const std::string& text) {
+  std::vector<std::string> files(1);
+  for (const char c : text)
+    if (c == ',')
+      files.emplace_back();
+    else
+      files.back() += c;
+  return files;
+}
+
+// FILE or FILE:NAME.
+std::pair<std::string, std::string> splitName(const std::string& text) {
+  std::error_code ignored;
+  const size_t colon = text.rfind(':');
+  if (colon == std::string::npos || std::filesystem::exists(text, ignored)) return {text, ""};
+  return {text.substr(0, colon), text.substr(colon + 1)};
+}
+
+void moveToFront(Estimates& all, const std::string& name, const std::string& file) {
+  const auto found =
+      std::find_if(all.estimates.begin(), all.estimates.end(), [&](const Estimate& e) { return e.name == name; });
+  if (found == all.estimates.end()) {
+    std::string known;
+    for (const Estimate& e : all.estimates) known += (known.empty() ? "" : ", ") + e.name;
+    throw Error(ExitCode::BadInput, fmt::format("{}: no estimate '{}': it has {}", file, name, known));
+  }
+  std::rotate(all.estimates.begin(), found, found + 1);
+}
+
+Rgb<float> colourLike(const std::string& path, const Estimates& all, const ReadOptions& options) {
+  const ImageFile file = readImage(path);
+  if (file.width != all.width || file.height != all.height)
+    throw Error(ExitCode::BadInput, fmt::format("{}: {}x{} pixels, but the image that it belongs to has {}x{}", path,
+                                                file.width, file.height, all.width, all.height));
+  return readEstimates(file, {options.foreignName, options.role, options.samplesPerPixel, nullptr})
+      .estimates.front()
+      .mean;
+}
+
+Rgb<float> meanOfHalves(const Estimate& e) {
+  Rgb<float> mean = e.half[0];
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t i = 0; i < mean.size(); ++i) mean[c][i] = 0.5f * e.half[0][c][i] + 0.5f * e.half[1][c][i];
+  return mean;
+}
+
+}  // namespace
+
+std::vector<Attribute> estimateAttributes(const Estimates& all, bool timing) {
+  using Kind = Attribute::Kind;
+  std::vector<Attribute> list{{"braid/seed", Kind::String, std::to_string(all.seed), 0, 0, {}}};
+  for (const Estimate& e : all.estimates) {
+    const std::string prefix = "braid/" + e.name + "/";
+    list.push_back({prefix + "unbiased", Kind::Int, "", e.unbiased ? 1 : 0, 0, {}});
+    list.push_back({prefix + "correlation", Kind::String, toString(e.correlation), 0, 0, {}});
+    list.push_back({prefix + "passes", Kind::Int, "", static_cast<int64_t>(e.passes), 0, {}});
+    if (timing) list.push_back({prefix + "seconds", Kind::Float, "", 0, e.seconds, {}});
+  }
+  return list;
+}
+
+Estimates readEstimates(const ImageFile& file, const ReadOptions& options) {
+  const std::vector<std::string> layers = estimateNames(file);
+  if (!layers.empty()) return readBraid(file, layers);
+  Estimates all = emptyLike(file);
+  ForeignImage foreign = readForeign(file, options.role == ImageRole::Denoised, options.samplesPerPixel);
+  foreign.estimate.name = options.foreignName;
+  foreign.estimate.unbiased = options.role == ImageRole::Noisy;
+  all.estimates.push_back(std::move(foreign.estimate));
+  all.features = std::move(foreign.features);
+  if (options.notes) options.notes->insert(options.notes->end(), foreign.notes.begin(), foreign.notes.end());
+  return all;
+}
+
+Estimates readEstimatesOption(const std::string& text, const ReadOptions& options) {
+  const std::vector<std::string> files = splitFiles(text);
+  if (files.size() > 3 || std::count(files.begin(), files.end(), "") > 0)
+    throw Error(ExitCode::Usage, fmt::format("'{}': expected FILE, or HALFA,HALFB, or FILE,HALFA,HALFB", text));
+  const auto [path, name] = splitName(files[0]);
+  Estimates all = readEstimates(readImage(path), options);
+  if (!name.empty()) moveToFront(all, name, path);
+  Estimate& first = all.estimates.front();
+  if (files.size() == 2) {
+    first.half[0] = first.mean;
+    first.half[1] = colourLike(files[1], all, options);
+    first.mean = meanOfHalves(first);
+    first.variance = Rgb<float>();  // was that of one half
+    first.passes *= 2;
+    first.quarter.clear();
+  } else if (files.size() == 3) {
+    for (size_t h = 0; h < 2; ++h) first.half[h] = colourLike(files[1 + h], all, options);
+  }
+  for (Estimate& e : all.estimates)
+    if (e.unbiased) varianceFromHalves(e, path, options.notes);
+  if (options.notes && !complete(first.half))
+    options.notes->push_back(fmt::format(
+        "{}: no halves of {}: give two renders with different seeds as A.exr,B.exr for methods that need them", path,
+        first.name));
+  if (options.notes && first.unbiased && first.variance.empty())
+    options.notes->push_back(fmt::format("{}: no variance of {}", path, first.name));
+  return all;
+}
+
+}  // namespace braid

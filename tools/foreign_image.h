@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Images and features in the EXR files of pbrt, Mitsuba 3 and Cycles, by the channel names that they give.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "renderer/film/estimates.h"
+#include "renderer/film/exr.h"
+
+namespace braid {
+
+struct ForeignImage {
+  Estimate estimate;  // mean; variance of the mean and passes where the file tells them
+  std::optional<Features> features;
+  std::vector<std::string> notes;  // what is missing or assumed, a line each
+};
+
+// `denoised`: the image after denoising, where a file holds both. `samplesPerPixel`: where the file does not say; 0:
+// unknown. Throws Error(BadInput) for files without colours.
+ForeignImage readForeign(const ImageFile& file, bool denoised, uint64_t samplesPerPixel);
+
+// Fills what is missing: halves equal to the mean and no variance, that is free of noise, and zero planes for features
+// that there are not. False when there is neither albedo nor normal.
+bool completeFeatures(Features& features, int width, int height);
+
+}  // namespace braid

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the subcommands that write images share.
+#pragma once
+
+#include <string>
+
+#include "renderer/film/exr.h"
+
+namespace braid {
+
+// none, features or all. Throws Error(Usage).
+AovSet parseAovs(const std::string& name);
+
+// Finds out before hours of rendering that the result could not be saved. Throws Error(OutputFailed).
+void checkWritable(const std::string& path);
+
+}  // namespace braid

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/sweep_error.h"
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "renderer/core/error.h"
+#include "renderer/core/parallel.h"
+
+namespace braid {
+
+namespace {
+
+constexpr size_t kChunk = 4096;
+
+struct Sum {
+  double value = 0;
+  uint64_t count = 0, invalid = 0;
+  void operator+=(const Sum& s) { value += s.value, count += s.count, invalid += s.invalid; }
+  double mean() const { return count > 0 ? value / static_cast<double>(count) : 0; }
+};
+
+double at(const Rgb<float>& image, size_t c, size_t i) { return static_cast<double>(image[c][i]); }
+
+// Mean over pixels and channels of product(c, i) / (mean_RGB(R)² + 0.01).
+template <class Product>
+double relativeMean(const ReferenceImage& reference, const Rgb<float>& image, const Product& product) {
+  const Rgb<float>&a = reference.half[0], &b = reference.half[1];
+  const Sum sum = parallelSum(image.size(), kChunk, Sum{}, [&](size_t begin, size_t end) {
+    Sum s;
+    for (size_t i = begin; i < end; ++i) {
+      if (!isFinite(a.pixel(i)) || !isFinite(b.pixel(i))) continue;
+      ++s.count;
+      if (!isFinite(image.pixel(i))) {
+        ++s.invalid;
+        continue;
+      }
+      double level = 0, error = 0;
+      for (size_t c = 0; c < 3; ++c) {
+        level += 0.5 * (at(a, c, i) + at(b, c, i)) / 3;
+        error += product(c, i) / 3;
+      }
+      s.value += error / (sqr(level) + 0.01);
+    }
+    return s;
+  });
+  return sum.invalid > 0 ? std::numeric_limits<double>::infinity() : sum.mean();
+}
+
+}  // namespace
+
+double relL2Unbiased(const Rgb<float>& image, const ReferenceImage& reference) {
+  if (!reference.hasHalves()) return std::numeric_limits<double>::quiet_NaN();
+  const Rgb<float>&a = reference.half[0], &b = reference.half[1];
+  BRAID_ASSERT(image.size() == a.size() && image.width() == a.width());
+  return relativeMean(reference, image, [&](size_t c, size_t i) {
+    return (at(image, c, i) - at(a, c, i)) * (at(image, c, i) - at(b, c, i));
+  });
+}
+
+double referenceNoise(const ReferenceImage& reference) {
+  if (!reference.hasHalves()) return std::numeric_limits<double>::quiet_NaN();
+  const Rgb<float>&a = reference.half[0], &b = reference.half[1];
+  return relativeMean(reference, a, [&](size_t c, size_t i) { return sqr(0.5 * (at(a, c, i) - at(b, c, i))); });
+}
+
+Dominance dominance(const Rgb<float>& image, const Rgb<float>& baseline, const Rgb<float>& reference) {
+  BRAID_ASSERT(image.size() == baseline.size() && image.size() == reference.size());
+  struct Total {
+    double difference = 0, better = 0, count = 0;
+    void operator+=(const Total& t) { difference += t.difference, better += t.better, count += t.count; }
+  };
+  const Total total = parallelSum(image.size(), kChunk, Total{}, [&](size_t begin, size_t end) {
+    Total t;
+    for (size_t i = begin; i < end; ++i) {
+      if (!isFinite(reference.pixel(i))) continue;
+      double own = 0, other = 0;
+      for (size_t c = 0; c < 3; ++c) {
+        own += sqr(at(image, c, i) - at(reference, c, i)) / 3;
+        other += sqr(at(baseline, c, i) - at(reference, c, i)) / 3;
+      }
+      t += {own - other, own < other ? 1.0 : 0.0, 1.0};
+    }
+    return t;
+  });
+  if (total.count == 0) return {};
+  return {total.better / total.count, total.difference / total.count};
+}
+
+}  // namespace braid

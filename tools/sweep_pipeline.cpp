@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/sweep_pipeline.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "combiners/pipeline.h"
+#include "renderer/core/error.h"
+
+namespace braid {
+
+namespace {
+
+using Integrators = std::vector<const Integrator*>;
+
+const Integrator* findIntegrator(const Integrators& list, const std::string& name) {
+  const auto found = std::find_if(list.begin(), list.end(), [&](const Integrator* i) { return i->name() == name; });
+  return found == list.end() ? nullptr : *found;
+}
+
+// What a session will know of an integrator's estimate; checkpoints grow with the rounds.
+EstimateFacts factsOf(const Integrator& integrator) {
+  EstimateFacts facts;
+  facts.name = integrator.name();
+  facts.unbiased = integrator.unbiased();
+  facts.correlation = integrator.correlation();
+  facts.quarters = true;
+  facts.checkpoints = 1 << 20;
+  return facts;
+}
+
+// Runs all methods of the same inputs when the first of them is asked about a snapshot.
+class SharedPipeline {
+ public:
+  SharedPipeline(std::vector<MethodShare> inputs, std::string unbiased) : inputs_(std::move(inputs)) {
+    options_.roles.unbiased = std::move(unbiased);
+  }
+  const std::vector<MethodShare>& inputs() const { return inputs_; }
+  void want(const std::string& method) { wanted_.push_back(method); }
+
+  MethodImage image(const std::shared_ptr<const Estimates>& estimates, const std::string& method) {
+    if (estimates != estimates_) run(estimates);
+    const PipelineOutput* output = result_.find(method);
+    MethodImage made;
+    if (!output || !output->ran()) {
+      made.obstacle = output ? output->step.obstacle : "did not run";
+      return made;
+    }
+    made.image = output->result.image.mean;
+    const bool denoiser = output->step.method->kind() == MethodKind::Denoiser;
+    made.denoiseSeconds = output->inputSeconds + (denoiser ? output->seconds : 0);
+    made.combineSeconds = denoiser ? 0 : output->seconds;
+    return made;
+  }
+
+ private:
+  // Without the estimates that other methods brought in: roles are filled from what there is.
+  void run(const std::shared_ptr<const Estimates>& estimates) {
+    Estimates own = *estimates;
+    const auto foreign = [&](const Estimate& e) {
+      return std::none_of(inputs_.begin(), inputs_.end(), [&](const MethodShare& i) { return i.integrator == e.name; });
+    };
+    own.estimates.erase(std::remove_if(own.estimates.begin(), own.estimates.end(), foreign), own.estimates.end());
+    result_ = runPipeline(own, wanted_, options_);
+    estimates_ = estimates;
+  }
+
+  std::vector<MethodShare> inputs_;
+  PipelineOptions options_;
+  std::vector<std::string> wanted_;
+  std::shared_ptr<const Estimates> estimates_;
+  PipelineResult result_;
+};
+
+// A name taken apart and what it needs.
+struct Parsed {
+  std::string method;  // in the form of recipes
+  std::vector<MethodShare> inputs;
+  RecipeNeeds needs;
+};
+
+[[noreturn]] void refuse(const std::string& name, const std::string& reason) {
+  throw Error(ExitCode::Usage, fmt::format("--methods: {}: {}", name, reason));
+}
+
+// Integrators that a name speaks of: before a slash or pt, and after each '@'.
+std::vector<const Integrator*> namedIntegrators(const std::string& name, std::string& method,
+                                                const Integrators& integrators) {
+  // A slash may also be part of a file's path: external:folder/file.exr.
+  const size_t slash = name.find('/');
+  const Integrator* first = slash == std::string::npos ? nullptr : findIntegrator(integrators, name.substr(0, slash));
+  method = first ? name.substr(slash + 1) : name;
+  if (!first) first = findIntegrator(integrators, "pt");
+  if (!first) refuse(name, "there is no integrator pt: name one before a slash");
+  std::vector<const Integrator*> list{first};
+  for (size_t at = method.find('@'); at != std::string::npos; at = method.find('@', at + 1)) {
+    const Integrator* i = findIntegrator(integrators, method.substr(at + 1, method.find('@', at + 1) - at - 1));
+    if (i && std::find(list.begin(), list.end(), i) == list.end()) list.push_back(i);
+  }
+  return list;
+}
+
+// Throws Error(Usage) naming what there is: integrators as well as denoisers and combiners.
+Needs needsOfMethod(const std::string& method, const Integrators& integrators) {
+  try {
+    return findMethod(method.substr(0, method.find('@')))->needs();
+  } catch (const Error& e) {
+    std::string known;
+    for (const Integrator* i : integrators) known += fmt::format("{}{}", known.empty() ? "" : ", ", i->name());
+    throw Error(e.code(), fmt::format("--methods: {}; integrators are {}", e.what(), known));
+  }
+}
+
+Parsed parse(const std::string& name, const Integrators& integrators) {
+  Parsed parsed;
+  std::vector<const Integrator*> list = namedIntegrators(name, parsed.method, integrators);
+  if (needsOfMethod(parsed.method, integrators).correlated) {
+    const auto correlated = std::find_if(integrators.begin(), integrators.end(), [](const Integrator* i) {
+      return i->unbiased() && i->correlation() != Correlation::Independent;
+    });
+    if (correlated != integrators.end() && std::find(list.begin(), list.end(), *correlated) == list.end())
+      list.push_back(*correlated);
+  }
+  Facts facts;
+  facts.features = true;
+  for (const Integrator* i : list) {
+    facts.estimates.push_back(factsOf(*i));
+    parsed.inputs.push_back({i->name(), 1});
+  }
+  RecipeOptions roles;
+  roles.unbiased = list.front()->name();
+  const Recipe recipe = makeRecipe(facts, {parsed.method}, roles);
+  const Step* step = recipe.find(parsed.method);
+  BRAID_ASSERT(step);
+  if (!step->obstacle.empty()) refuse(name, step->obstacle);
+  parsed.needs = needsOf(recipe);
+  return parsed;
+}
+
+}  // namespace
+
+std::vector<SweepMethod> sweepMethods(const std::vector<std::string>& names, const Integrators& integrators) {
+  const std::vector<SweepMethod> plain = integratorMethods(integrators);
+  std::vector<SweepMethod> known = plain;
+  std::vector<std::shared_ptr<SharedPipeline>> pipelines;
+  for (const std::string& name : names) {
+    if (findIntegrator(integrators, name)) continue;
+    const Parsed parsed = parse(name, integrators);
+    auto found =
+        std::find_if(pipelines.begin(), pipelines.end(), [&](const auto& p) { return p->inputs() == parsed.inputs; });
+    if (found == pipelines.end())
+      found =
+          pipelines.insert(found, std::make_shared<SharedPipeline>(parsed.inputs, parsed.inputs.front().integrator));
+    const std::shared_ptr<SharedPipeline> pipeline = *found;
+    pipeline->want(parsed.method);
+    SweepMethod method;
+    method.name = name;
+    method.inputs = parsed.inputs;
+    method.features = parsed.needs.features;
+    method.quarters = parsed.needs.quarters;
+    method.history = parsed.needs.checkpoints > 0;
+    method.finish = [pipeline, wanted = parsed.method](const std::shared_ptr<const Estimates>& estimates) {
+      return pipeline->image(estimates, wanted);
+    };
+    known.push_back(std::move(method));
+  }
+  return chooseMethods(names, known);
+}
+
+}  // namespace braid
