@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "integrators/camera_paths.h"
 #include "integrators/tiles.h"
 #include "renderer/session/pixel_filter.h"
 
@@ -110,12 +111,7 @@ void BidirectionalKernel::render(const std::vector<std::pair<int, int>>& pixels)
   for (const std::pair<int, int>& p : pixels) {
     const uint64_t key = eyeSampler_.itemKey(item(p));
     const SampleBlock u = eyeSampler_.block(key, 0);
-    const PixelFilter filter = plan_.settings.filter;
-    Vec2 offset(u.u[slot::kPixelX] - 0.5f, u.u[slot::kPixelY] - 0.5f);
-    if (filter != PixelFilter::Box)
-      offset = {sampleFilter(filter, u.u[slot::kPixelX]), sampleFilter(filter, u.u[slot::kPixelY])};
-    const Camera::CameraRay ray =
-        camera.ray(Vec2(static_cast<float>(p.first) + 0.5f, static_cast<float>(p.second) + 0.5f) + offset);
+    const Camera::CameraRay ray = cameraRayThrough(plan_, u, p.first, p.second);
     eye_.startCamera(key, ray, cameraMedia_, camera.pixelPdf(ray.direction), lights_.count, camera.orthographic());
   }
   eye_.run([&](int i, const SubpathState& s, const SubpathVertex& v) { return shadeEyeVertex(i, s, v); },
@@ -200,7 +196,11 @@ bool BidirectionalKernel::shadeEyeVertex(int index, const SubpathState& state, c
     return false;
   }
   if (material.emissive) addEmission(index, state, vertex);
-  const bool first = plan_.features && !featuresDone_[static_cast<size_t>(index)] && recordFeatures(index, vertex);
+  bool& featuresDone = featuresDone_[static_cast<size_t>(index)];
+  const bool first =
+      plan_.features && !featuresDone &&
+      recordFeatures(scene_, vertex, plan_.settings.maxDepth, sample_[static_cast<size_t>(index)].features);
+  featuresDone = featuresDone || first;
   if (vertex.segments >= plan_.settings.maxDepth) return false;
   if (!vertex.bsdf.hasNonDelta()) return true;
   sampleLight(index, vertex, first);
@@ -209,29 +209,13 @@ bool BidirectionalKernel::shadeEyeVertex(int index, const SubpathState& state, c
   return true;
 }
 
-bool BidirectionalKernel::recordFeatures(int index, const SubpathVertex& vertex) {
-  if (!vertex.bsdf.hasNonDelta() && vertex.segments < plan_.settings.maxDepth) return false;
-  const Hit& hit = vertex.hit;
-  FeatureSample& f = sample_[static_cast<size_t>(index)].features;
-  featuresDone_[static_cast<size_t>(index)] = true;
-  f.albedo = vertex.bsdf.albedo();
-  if (hit.material->emissive()) f.albedo += scene_.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
-  f.normal = hit.frame.n;
-  f.depth = vertex.travelled;
-  return true;
-}
-
 // As in the path tracer: shown to the camera and to mirrors only.
 void BidirectionalKernel::addUnlit(int index, const SubpathState& state, const SubpathVertex& vertex) {
-  const Spectrum color = baseColorAt(scene_, vertex.hit);
-  if (state.lightCouldNotBeSampled) add(index, 0, vertex.segments + 1, vertex.throughput * color);
   bool& done = featuresDone_[static_cast<size_t>(index)];
-  if (!plan_.features || done) return;
+  const Spectrum color =
+      unlitColor(scene_, vertex, plan_.features && !done, sample_[static_cast<size_t>(index)].features);
   done = true;
-  FeatureSample& f = sample_[static_cast<size_t>(index)].features;
-  f.albedo = color;
-  f.normal = vertex.hit.frame.n;
-  f.depth = vertex.travelled;
+  if (state.lightCouldNotBeSampled) add(index, 0, vertex.segments + 1, vertex.throughput * color);
 }
 
 void BidirectionalKernel::addEmission(int index, const SubpathState& state, const SubpathVertex& vertex) {

@@ -101,7 +101,6 @@ class BidirectionalKernel {
   void addEmission(int index, const SubpathState& state, const SubpathVertex& vertex);
   void addEnvironment(int index, const SubpathState& state);
   void addUnlit(int index, const SubpathState& state, const SubpathVertex& vertex);
-  bool recordFeatures(int index, const SubpathVertex& vertex);
   void sampleLight(int index, const SubpathVertex& vertex, bool forFeatures);
   void connect(int index, const SubpathVertex& eye);
   void merge(int index, const SubpathVertex& eye);

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
+#include "integrators/camera_paths.h"
 #include "renderer/core/error.h"
-#include "renderer/session/pixel_filter.h"
 #include "renderer/transport/mis.h"
 
 namespace braid {
@@ -186,12 +186,7 @@ bool PathKernel::scatter(PathState& path, const Hit& hit, const Bsdf& bsdf, bool
 void PathKernel::start(int x, int y, uint64_t key) {
   BRAID_ASSERT(count_ < kBatch);
   const SampleBlock camera = sampler_.block(key, 0);
-  const PixelFilter filter = plan_.settings.filter;
-  Vec2 offset(camera.u[slot::kPixelX] - 0.5f, camera.u[slot::kPixelY] - 0.5f);
-  if (filter != PixelFilter::Box)
-    offset = {sampleFilter(filter, camera.u[slot::kPixelX]), sampleFilter(filter, camera.u[slot::kPixelY])};
-  const Camera::CameraRay ray =
-      plan_.camera.ray(Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) + offset);
+  const Camera::CameraRay ray = cameraRayThrough(plan_, camera, x, y);
   const auto i = static_cast<size_t>(count_++);
   sample_[i] = PathSample();
   PathState& path = path_[i];

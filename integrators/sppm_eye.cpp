@@ -3,8 +3,8 @@
 
 #include <optional>
 
+#include "integrators/camera_paths.h"
 #include "renderer/core/error.h"
-#include "renderer/session/pixel_filter.h"
 #include "renderer/transport/mis.h"
 
 namespace braid {
@@ -42,12 +42,7 @@ void PhotonEyeBatch::clear() {
 void PhotonEyeBatch::start(int x, int y, uint64_t key) {
   BRAID_ASSERT(count_ < kBatch);
   const SampleBlock camera = sampler_.block(key, 0);
-  const PixelFilter filter = plan_.settings.filter;
-  Vec2 offset(camera.u[slot::kPixelX] - 0.5f, camera.u[slot::kPixelY] - 0.5f);
-  if (filter != PixelFilter::Box)
-    offset = {sampleFilter(filter, camera.u[slot::kPixelX]), sampleFilter(filter, camera.u[slot::kPixelY])};
-  const Camera::CameraRay ray =
-      plan_.camera.ray(Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) + offset);
+  const Camera::CameraRay ray = cameraRayThrough(plan_, camera, x, y);
   path_[static_cast<size_t>(count_)] = Path();
   sample_[static_cast<size_t>(count_)] = PathSample();
   ++count_;
@@ -63,7 +58,10 @@ PhotonEyeBatch::Step PhotonEyeBatch::shade(int index, SubpathState& state, Subpa
   }
   if (material.emissive) addEmission(index, state, vertex);
   if (path.seekingLight) return {};
-  const bool first = plan_.features && !path.featuresDone && recordFeatures(index, vertex);
+  const bool first =
+      plan_.features && !path.featuresDone &&
+      recordFeatures(scene_, vertex, plan_.settings.maxDepth, sample_[static_cast<size_t>(index)].features);
+  path.featuresDone = path.featuresDone || first;
   if (vertex.segments >= plan_.settings.maxDepth) return {};
   path.choice = 1;
   if (!vertex.bsdf.hasNonDelta()) return {.goesOn = true};
@@ -91,29 +89,13 @@ PhotonEyeBatch::Step PhotonEyeBatch::shade(int index, SubpathState& state, Subpa
   return {.goesOn = lightsCanBeHit_ && !plan_.settings.photonDirect, .gather = true};
 }
 
-bool PhotonEyeBatch::recordFeatures(int index, const SubpathVertex& vertex) {
-  if (!vertex.bsdf.hasNonDelta() && vertex.segments < plan_.settings.maxDepth) return false;
-  const Hit& hit = vertex.hit;
-  path_[static_cast<size_t>(index)].featuresDone = true;
-  FeatureSample& f = sample_[static_cast<size_t>(index)].features;
-  f.albedo = vertex.bsdf.albedo();
-  if (hit.material->emissive()) f.albedo += scene_.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
-  f.normal = hit.frame.n;
-  f.depth = vertex.travelled;
-  return true;
-}
-
 // As in the path tracer: shown to the camera and to mirrors only.
 void PhotonEyeBatch::addUnlit(int index, const SubpathState& state, const SubpathVertex& vertex) {
-  const Spectrum color = baseColorAt(scene_, vertex.hit);
   PathSample& sample = sample_[static_cast<size_t>(index)];
-  if (state.lightCouldNotBeSampled) sample.radiance += vertex.throughput * color;
   bool& done = path_[static_cast<size_t>(index)].featuresDone;
-  if (!plan_.features || done) return;
+  const Spectrum color = unlitColor(scene_, vertex, plan_.features && !done, sample.features);
   done = true;
-  sample.features.albedo = color;
-  sample.features.normal = vertex.hit.frame.n;
-  sample.features.depth = vertex.travelled;
+  if (state.lightCouldNotBeSampled) sample.radiance += vertex.throughput * color;
 }
 
 void PhotonEyeBatch::addEmission(int index, const SubpathState& state, const SubpathVertex& vertex) {

@@ -65,7 +65,6 @@ class PhotonEyeBatch {
   void addEnvironment(int index, const SubpathState& state);
   void addEmission(int index, const SubpathState& state, const SubpathVertex& vertex);
   void addUnlit(int index, const SubpathState& state, const SubpathVertex& vertex);
-  bool recordFeatures(int index, const SubpathVertex& vertex);
   void sampleLight(int index, const SubpathVertex& vertex, const Lobes& lobes, const SampleBlock& block,
                    bool forFeatures);
   void traceShadows();

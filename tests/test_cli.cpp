@@ -11,6 +11,7 @@
 #include <spawn.h>
 #include <sys/wait.h>
 
+#include "renderer/film/error_map.h"
 #include "renderer/film/exr.h"
 #include "tests/gltf_fixture.h"
 
@@ -111,6 +112,19 @@ TEST_CASE("A render writes the documented channels and header") {
   CHECK(attribute(file, "samplesPerPixel")->integer == 2);
   REQUIRE(attribute(file, "braid/seed"));
   CHECK(attribute(file, "braid/seed")->text == "7");
+}
+
+TEST_CASE("A photon map comes with its bias, and with an error map of variance and squared bias") {
+  const Folder folder;
+  const ImageFile file = rendered(folder, "--integrator sppm --spp 8");
+  const std::set<std::string> names = channels(file);
+  for (const char* layer : {"sppm.mean.R", "sppm.bias.R", "sppm.biasVariance.R", "Error.R"})
+    CHECK_MESSAGE(names.count(layer), layer);
+  Estimate estimate;
+  estimate.variance = file.rgb("sppm.variance");
+  estimate.bias = file.rgb("sppm.bias");
+  estimate.biasVariance = file.rgb("sppm.biasVariance");
+  CHECK(file.planes.at("Error.R").data == errorMap(estimate).data);
 }
 
 TEST_CASE("Options choose what is written") {

@@ -11,6 +11,7 @@
 
 #include "combiners/registry.h"
 #include "renderer/core/error.h"
+#include "renderer/film/error_map.h"
 #include "tools/cli.h"
 
 namespace braid {
@@ -158,7 +159,12 @@ CombinedLayers::CombinedLayers(const PipelineResult& result, const std::vector<s
     if (std::none_of(list_.begin(), list_.end(), [&](const Layer& l) { return l.name == layer; }))
       list_.push_back({layer, &out->result.image.mean, nullptr});
   }
-  if (!last) return;
+  if (!last) {
+    // An integrator is the headline: if it is biased and knows by how much, its error is more than its variance.
+    if (!estimates.estimates.empty() && !estimates.estimates.front().bias.empty())
+      add("Error", errorMap(estimates.estimates.front()));
+    return;
+  }
   headline_ = &last->result.image.mean;
   if (!last->result.error.empty()) add("Error", last->result.error);
   estimates.attributes.push_back(

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "renderer/core/hash.h"
+#include "renderer/session/integrator.h"
 #include "renderer/session/pixel_filter.h"
 #include "tools/estimates_file.h"
 #include "version.h"
@@ -45,6 +46,16 @@ Attribute matrix(const std::string& name, const Mat4& m) {
   return a;
 }
 
+// What the variance planes of the plan's integrators are.
+std::string varianceIs(const Plan& plan) {
+  std::string rescaled;
+  for (const PlannedIntegrator& p : plan.integrators)
+    if (p.integrator->lowDiscrepancy(plan.settings))
+      rescaled += (rescaled.empty() ? "" : ", ") + std::string(p.integrator->name());
+  return rescaled.empty() ? "variance of the mean"
+                          : "variance of the mean; of " + rescaled + " rescaled from independent buckets";
+}
+
 }  // namespace
 
 std::vector<Attribute> headerAttributes(const Scene& scene, const Session& session, const RenderResult& result,
@@ -64,9 +75,7 @@ std::vector<Attribute> headerAttributes(const Scene& scene, const Session& sessi
       text("braid/sampler", s.sampler == SamplerKind::Sobol ? "sobol" : "independent"),
       text("braid/filter", toString(s.filter)),
       integer("braid/maxDepth", static_cast<uint64_t>(s.maxDepth)),
-      text("braid/varianceIs", s.sampler == SamplerKind::Sobol
-                                   ? "variance of the mean, rescaled from independent buckets"
-                                   : "variance of the mean"),
+      text("braid/varianceIs", varianceIs(plan)),
       integer("samplesPerPixel", result.estimates->estimates.front().passes),
       integer("braid/rejectedSamples", result.rejected),
       matrix("worldToCamera", plan.camera.worldToCamera()),

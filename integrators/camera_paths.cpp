@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "integrators/camera_paths.h"
+
+#include "renderer/session/pixel_filter.h"
+
+namespace braid {
+
+Camera::CameraRay cameraRayThrough(const Plan& plan, const SampleBlock& camera, int x, int y) {
+  const PixelFilter filter = plan.settings.filter;
+  Vec2 offset(camera.u[slot::kPixelX] - 0.5f, camera.u[slot::kPixelY] - 0.5f);
+  if (filter != PixelFilter::Box)
+    offset = {sampleFilter(filter, camera.u[slot::kPixelX]), sampleFilter(filter, camera.u[slot::kPixelY])};
+  return plan.camera.ray(Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) + offset);
+}
+
+bool recordFeatures(const Scene& scene, const SubpathVertex& vertex, int maxDepth, FeatureSample& features) {
+  if (!vertex.bsdf.hasNonDelta() && vertex.segments < maxDepth) return false;
+  const Hit& hit = vertex.hit;
+  features.albedo = vertex.bsdf.albedo();
+  if (hit.material->emissive()) features.albedo += scene.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
+  features.normal = hit.frame.n;
+  features.depth = vertex.travelled;
+  return true;
+}
+
+Spectrum unlitColor(const Scene& scene, const SubpathVertex& vertex, bool record, FeatureSample& features) {
+  const Spectrum color = baseColorAt(scene, vertex.hit);
+  if (record) {
+    features.albedo = color;
+    features.normal = vertex.hit.frame.n;
+    features.depth = vertex.travelled;
+  }
+  return color;
+}
+
+}  // namespace braid

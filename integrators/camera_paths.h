@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// What integrators with camera subpaths do alike: the ray through a pixel, and the features of what it sees.
+#pragma once
+
+#include "renderer/session/plan.h"
+#include "renderer/transport/subpath.h"
+
+namespace braid {
+
+// The ray of a sample of pixel (x, y) of the full frame; its place in the pixel follows the plan's filter. `camera` is
+// block 0 of the sample's random numbers.
+Camera::CameraRay cameraRayThrough(const Plan& plan, const SampleBlock& camera, int x, int y);
+
+// Records a vertex as the first that is not specular, or as the last of its path; false when it is neither.
+bool recordFeatures(const Scene& scene, const SubpathVertex& vertex, int maxDepth, FeatureSample& features);
+
+// Records an unlit surface and returns its colour, which only the camera and mirrors see.
+Spectrum unlitColor(const Scene& scene, const SubpathVertex& vertex, bool record, FeatureSample& features);
+
+}  // namespace braid
