@@ -121,6 +121,7 @@ TEST_CASE("A photon map comes with its bias, and with an error map of variance a
   for (const char* layer : {"sppm.mean.R", "sppm.bias.R", "sppm.biasVariance.R", "Error.R"})
     CHECK_MESSAGE(names.count(layer), layer);
   Estimate estimate;
+  estimate.mean = file.rgb("sppm.mean");
   estimate.variance = file.rgb("sppm.variance");
   estimate.bias = file.rgb("sppm.bias");
   estimate.biasVariance = file.rgb("sppm.biasVariance");
