@@ -160,7 +160,8 @@ void Scene::appendEmitters(uint32_t meshIndex, const Mat4& toWorld) {
         Spectrum sum(0);
         for (int i = 0; i < 7; ++i)
           for (int j = 0; j < 7 - i; ++j)
-            sum += coveredEmission(mesh, e.triangle, (static_cast<float>(i) + 0.33f) / 7, (static_cast<float>(j) + 0.33f) / 7);
+            sum += coveredEmission(mesh, e.triangle, (static_cast<float>(i) + 0.33f) / 7,
+                                   (static_cast<float>(j) + 0.33f) / 7);
         e.meanRadiance = sum / 28.0f;
       }
       if (e.area == 0) e.meanRadiance = Spectrum(0);
@@ -235,7 +236,8 @@ bool Scene::passThrough(uint32_t meshIndex, uint32_t triangle, float u, float v,
   const Material& mat = material(m);
   // TRAP: culling is one-way, so it must not take part in transport: light that passes a wall from behind could not be
   // traced from the light, which meets the wall's front.
-  if (backFace && (salt & kCameraRay) && !mat.doubleSided && !mat.transmissive() && mat.diffuseTransmission == 0) return true;
+  if (backFace && (salt & kCameraRay) && !mat.doubleSided && !mat.transmissive() && mat.diffuseTransmission == 0)
+    return true;
   if (mat.alphaMode == AlphaMode::Opaque) return false;
   const float a = alpha(m, triangle, u, v);
   if (a <= 0) return true;

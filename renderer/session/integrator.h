@@ -53,7 +53,7 @@ struct PassRequest {
   const std::atomic<bool>* cancel = nullptr;  // checked per tile; a cancelled pass is discarded
   PassStatistics* statistics = nullptr;
   std::vector<std::vector<RecordedRay>>* record = nullptr;  // per tile, for benchmarks; usually null
-  const Preparation* preparation = nullptr;  // of prepare(); null: the pass prepares for itself
+  const Preparation* preparation = nullptr;                 // of prepare(); null: the pass prepares for itself
 };
 
 class Integrator {

@@ -75,19 +75,19 @@ struct SubpathState {
   uint64_t key = 0;
   int segments = 1;  // including the ray that is under way
   int nullCrossings = 0;
-  float travelled = 0;    // metres since the start
+  float travelled = 0;  // metres since the start
   uint32_t salt = 0;
   float startThroughput = 1;
   float etaScale = 1;
   bool byDistance = true;  // densities of the first hit depend on its distance: not for parallel rays
   bool deltaOnly = true;
   float leastPdfW = kInfinity;  // of the directions sampled so far; delta ones do not count
-  bool atStart = true;  // no surface met yet
+  bool atStart = true;          // no surface met yet
 
   // The last vertex that scattered, for the weight of lights that the walk hits.
   Vec3 lastPosition{0}, lastNormal{0};
   bool lastTwoSided = false;
-  float lastPdfW = 0;  // of the direction sampled there
+  float lastPdfW = 0;                  // of the direction sampled there
   bool lightCouldNotBeSampled = true;  // camera, delta scattering, or a null interface since
 
   uint32_t light = 0;  // where a light subpath started
