@@ -72,10 +72,6 @@ struct Prior {
   Rgb<float> mean, half[2];
 };
 
-Rgb<float> average(const Rgb<float>& a, const Rgb<float>& b) {
-  return blend(a, b, Plane<float>(a.width(), a.height(), 0.5f));
-}
-
 // The prior of all samples and those of the halves, each by a fit of its own.
 Prior ownFits(const MethodInputs& in, const Rgb<float>& variance, const Rgb<float> (&stageOne)[3],
               const RegressionSettings& settings, RegressionReport& report) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "combiners/box_mean.h"
+#include "combiners/channel_mean.h"
 #include "combiners/finite_float.h"
 #include "renderer/core/parallel.h"
 
@@ -12,20 +13,6 @@ namespace braid {
 namespace {
 
 constexpr size_t kChunk = 4096;
-
-// map(i, c) averaged over channels.
-template <class Map>
-Plane<float> channelMean(int width, int height, const Map& map) {
-  Plane<float> out(width, height);
-  parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      double sum = 0;
-      for (size_t c = 0; c < 3; ++c) sum += map(i, c);
-      out[i] = finiteFloat(sum / 3);
-    }
-  });
-  return out;
-}
 
 double squaredDifference(const Rgb<float>& a, const Rgb<float>& b, size_t i, size_t c) {
   const double d = static_cast<double>(a[c][i]) - static_cast<double>(b[c][i]);

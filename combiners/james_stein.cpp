@@ -51,13 +51,6 @@ Rgb<float> halfVariance(const Estimate& x, const Rgb<float>& variance, size_t h)
   return out;
 }
 
-Rgb<float> average(const Rgb<float>& a, const Rgb<float>& b) {
-  Rgb<float> out = a;
-  for (size_t c = 0; c < 3; ++c)
-    for (size_t i = 0; i < out.size(); ++i) out[c][i] = 0.5f * a[c][i] + 0.5f * b[c][i];
-  return out;
-}
-
 // The images that X, X^A and X^B are pulled towards.
 struct Targets {
   Rgb<float> mean, half[2], crossed[2];

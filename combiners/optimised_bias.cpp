@@ -29,14 +29,7 @@ double halfDifference(const Estimate& e) {
 
 }  // namespace
 
-Rgb<float> OptimisedBias::mean() const {
-  Rgb<float> out(crossed[0].width(), crossed[0].height());
-  parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
-    for (size_t c = 0; c < 3; ++c)
-      for (size_t i = begin; i < end; ++i) out[c][i] = 0.5f * crossed[0][c][i] + 0.5f * crossed[1][c][i];
-  });
-  return out;
-}
+Rgb<float> OptimisedBias::mean() const { return average(crossed[0], crossed[1]); }
 
 OptimisedBias optimisedBias(const Estimate& unbiased, const Estimate& biased, const Features* features,
                             const RegressionSettings& settings) {

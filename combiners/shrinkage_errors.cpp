@@ -5,6 +5,7 @@
 #include "combiners/box_mean.h"
 #include "combiners/double_shrinkage.h"
 #include "combiners/error_map.h"
+#include "combiners/channel_mean.h"
 #include "combiners/finite_float.h"
 #include "combiners/joint_filter.h"
 
@@ -14,17 +15,6 @@ namespace {
 
 constexpr int kRadius = 6;
 constexpr double kWinsorise = 8;
-
-// map(i, c) averaged over channels.
-template <class Map>
-Plane<float> channelMean(const Rgb<float>& like, const Map& map) {
-  Plane<float> out(like.width(), like.height());
-  parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i)
-      out[i] = finiteFloat((map(i, size_t(0)) + map(i, size_t(1)) + map(i, size_t(2))) / 3);
-  });
-  return out;
-}
 
 double at(const Rgb<float>& image, size_t i, size_t c) { return static_cast<double>(image[c][i]); }
 

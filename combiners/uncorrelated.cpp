@@ -45,9 +45,7 @@ MethodResult Uncorrelated::run(const MethodInputs& in) const {
   Estimate& out = result.image;
   for (int h = 0; h < 2; ++h) out.half[h] = uncorrelatedFiltered(groups[h], gamma);
   if (swap) {
-    out.mean = out.half[0];
-    for (size_t c = 0; c < 3; ++c)
-      for (size_t i = 0; i < out.mean.size(); ++i) out.mean[c][i] = 0.5f * (out.mean[c][i] + out.half[1][c][i]);
+    out.mean = average(out.half[0], out.half[1]);
     // Both have seen all samples: no halves that are independent of each other, and no error from their difference.
     out.half[0] = out.half[1] = {};
   } else {

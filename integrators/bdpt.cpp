@@ -55,8 +55,7 @@ bool renderBidirectionalPass(const PassRequest& request, PassTarget& target, Str
   return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>*) {
     BidirectionalKernel kernel(request, pass.lights, pass.eyeSampler, pass.cameraMedia, target, observer);
     renderTile(kernel, tile);
-    return TileCounts{static_cast<uint64_t>(tile.width()) * static_cast<uint64_t>(tile.height()), kernel.rayCount(),
-                      kernel.shadowRayCount()};
+    return TileCounts{pixelCount(tile), kernel.rayCount(), kernel.shadowRayCount()};
   });
 }
 

@@ -6,13 +6,12 @@
 #include "integrators/camera_paths.h"
 #include "integrators/tiles.h"
 #include "renderer/session/pixel_filter.h"
+#include "renderer/transport/shadow_ray.h"
 
 namespace braid {
 
 namespace {
 
-// Shadow rays stop this share of their length before their end, so that its own triangle does not hide it.
-constexpr float kShadowLength = 1 - 1e-4f;
 constexpr int kRouletteStart = 2;
 // Connections that promise less than this share of what the path's connections have promised so far are decided by
 // Russian roulette: their shadow rays would cost more than they tell (Veach 1997, section 10.3.3).
@@ -184,7 +183,7 @@ void BidirectionalKernel::connectToCamera(const SubpathVertex& vertex) {
   // From the camera, so that culled back faces let it pass as they do camera rays.
   const Vec3 end = offsetOrigin(vertex.hit, wi);
   const uint32_t salt = lights_.sampler.salt(vertex.key, 0x10000u + static_cast<uint32_t>(vertex.segments));
-  queue_.add({ray.origin, end - ray.origin, kShadowLength, salt | kCameraRay},
+  queue_.add(connectionRay(ray.origin, end, salt | kCameraRay),
              {value, vertex.segments + 1, 1, -1, static_cast<int>(raster.x), static_cast<int>(raster.y)});
 }
 
@@ -284,14 +283,8 @@ void BidirectionalKernel::sampleLight(int index, const SubpathVertex& vertex, bo
   const Spectrum value = vertex.throughput * v.f * light.radiance * (weight / light.pdfW) *
                          mediaTransmittance(scene_, v.media, light.distance);
   if (isBlack(value)) return;
-  RayQuery ray{offsetOrigin(hit, light.wi), light.wi, kInfinity,
-               eyeSampler_.salt(vertex.key, 0x10000u + static_cast<uint32_t>(vertex.segments)) & ~kCameraRay};
-  if (light.distance < kInfinity) {
-    // Aimed anew from the moved origin, as in the path tracer.
-    ray.direction = hit.position + light.wi * light.distance - ray.origin;
-    ray.tmax = kShadowLength;
-  }
-  queue_.add(ray, {value, 1, vertex.segments + 1, index, 0, 0, forFeatures});
+  const uint32_t salt = eyeSampler_.salt(vertex.key, 0x10000u + static_cast<uint32_t>(vertex.segments)) & ~kCameraRay;
+  queue_.add(shadowRay(hit, light.wi, light.distance, salt), {value, 1, vertex.segments + 1, index, 0, 0, forFeatures});
 }
 
 void BidirectionalKernel::connect(int index, const SubpathVertex& eye) {
@@ -336,8 +329,7 @@ void BidirectionalKernel::connect(int index, const SubpathVertex& eye) {
     const Vec3 end = offsetOrigin(light.hit, -c.direction);
     const uint32_t salt = eyeSampler_.salt(
         eye.key, 0x20000u + static_cast<uint32_t>(eye.segments) * 64u + static_cast<uint32_t>(c.vertex));
-    queue_.add({origin, end - origin, kShadowLength, salt & ~kCameraRay},
-               {value, light.segments + 1, eye.segments + 1, index});
+    queue_.add(connectionRay(origin, end, salt & ~kCameraRay), {value, light.segments + 1, eye.segments + 1, index});
   }
 }
 

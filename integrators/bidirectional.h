@@ -48,11 +48,6 @@ struct Merging {
 // The walks of a plan's subpaths; merging may be null.
 WalkSettings bidirectionalWalk(const Plan& plan, Transport transport, const Merging* merging);
 
-// The item of a pixel of the full frame, by which its random numbers are keyed.
-inline uint64_t pixelItem(const Plan& plan, int x, int y) {
-  return static_cast<uint64_t>(y) * static_cast<uint64_t>(plan.settings.width) + static_cast<uint64_t>(x);
-}
-
 // Follows connections that may be blocked, up to a batch at a time, and hands out what is visible.
 class ConnectionQueue {
  public:

@@ -42,23 +42,7 @@ class CommonRandomNumbers final : public Integrator {
   uint64_t pixelKey(const PassSampler& sampler, const Plan&, int, int) const override { return sampler.itemKey(0); }
 
   bool renderPass(const PassRequest& request, PassTarget& target) const override {
-    const Plan& plan = request.plan;
-    const std::unique_ptr<PassSampler> sampler = pixelSampler(plan, request.pass);
-    const uint64_t key = pixelKey(*sampler, plan, 0, 0);
-    return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>* record) {
-      PathKernel kernel(request.context, plan, *sampler, record, kLateRoulette);
-      const int pixels = tile.width() * tile.height();
-      const auto pixelX = [&](int i) { return tile.x0 + i % tile.width(); };
-      const auto pixelY = [&](int i) { return tile.y0 + i / tile.width(); };
-      for (int first = 0; first < pixels; first += kBatch) {
-        const int last = std::min(pixels, first + kBatch);
-        kernel.clear();
-        for (int i = first; i < last; ++i) kernel.start(pixelX(i), pixelY(i), key);
-        kernel.run();
-        for (int i = first; i < last; ++i) storeSample(request, pixelX(i), pixelY(i), kernel.sample(i - first), target);
-      }
-      return TileCounts{static_cast<uint64_t>(pixels), kernel.rayCount, kernel.shadowRayCount};
-    });
+    return renderCameraPaths(*this, request, target);
   }
 };
 

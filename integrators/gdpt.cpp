@@ -53,10 +53,7 @@ struct BackgroundPixels : Preparation {
     PathKernel kernel(context, plan, sampler, nullptr);
     for (int y = tile.y0; y < tile.y1; ++y) {
       kernel.clear();
-      for (int x = tile.x0; x < tile.x1; ++x)
-        kernel.start(x, y,
-                     sampler.itemKey(static_cast<uint64_t>(y) * static_cast<uint64_t>(plan.settings.width) +
-                                     static_cast<uint64_t>(x)));
+      for (int x = tile.x0; x < tile.x1; ++x) kernel.start(x, y, sampler.itemKey(pixelItem(plan, x, y)));
       kernel.run();
       for (int x = tile.x0; x < tile.x1; ++x)
         if (kernel.sample(x - tile.x0).coverage > 0) background.at(x - plan.window.x0, y - plan.window.y0) = 0;
@@ -168,26 +165,21 @@ bool GradientDomainPathTracer::samplePass(const PassRequest& request, PassSample
   const PassSampler sampler(plan.settings.sampler, plan.settings.seed, kStream, request.pass);
   return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>* record) {
     GradientKernel kernel(request.context, plan, sampler, record);
-    const int pixels = tile.width() * tile.height();
-    const auto pixelX = [&](int i) { return tile.x0 + i % tile.width(); };
-    const auto pixelY = [&](int i) { return tile.y0 + i / tile.width(); };
-    for (int first = 0; first < pixels; first += kBatch) {
-      const int last = std::min(pixels, first + kBatch);
-      kernel.clear();
-      for (int i = first; i < last; ++i) {
-        const auto item = static_cast<uint64_t>(pixelY(i)) * static_cast<uint64_t>(plan.settings.width);
-        kernel.start(pixelX(i), pixelY(i), sampler.itemKey(item + static_cast<uint64_t>(pixelX(i))));
-      }
-      kernel.run();
-      for (int i = first; i < last; ++i) {
-        const GradientSample& sample = kernel.sample(i - first);
-        const int x = pixelX(i) - plan.window.x0, y = pixelY(i) - plan.window.y0;
-        samples.set(samples.base[0].index(x, y), sample, plan.settings.clamp);
-        if (plan.features) target.features(x, y, sample.path.features);
-        if (target.wantsCoverage()) target.coverage(x, y, sample.path.coverage);
-      }
-    }
-    return TileCounts{static_cast<uint64_t>(pixels), kernel.rayCount, kernel.shadowRayCount};
+    forEachBatch(
+        tile,
+        [&](int i, int x, int y) {
+          if (i == 0) kernel.clear();
+          kernel.start(x, y, sampler.itemKey(pixelItem(plan, x, y)));
+        },
+        [&] { kernel.run(); },
+        [&](int i, int frameX, int frameY) {
+          const GradientSample& sample = kernel.sample(i);
+          const int x = frameX - plan.window.x0, y = frameY - plan.window.y0;
+          samples.set(samples.base[0].index(x, y), sample, plan.settings.clamp);
+          if (plan.features) target.features(x, y, sample.path.features);
+          if (target.wantsCoverage()) target.coverage(x, y, sample.path.coverage);
+        });
+    return TileCounts{pixelCount(tile), kernel.rayCount, kernel.shadowRayCount};
   });
 }
 

@@ -57,8 +57,4 @@ Applies lightSubpathsApply(const SceneTraits& traits, const LightReach& reach) {
                       100 * reach.caustic, 100 * reach.lit, 100 * arrivals)};
 }
 
-MediaStack mediaOfCamera(const Scene& scene, const Camera& camera) {
-  return scene.traits().has(kTraitVolume) ? mediaAround(scene, camera.position(), camera.forward()) : MediaStack();
-}
-
 }  // namespace braid

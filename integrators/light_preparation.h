@@ -27,7 +27,4 @@ struct LightPreparation : Preparation {
 // Whether light subpaths find light that camera paths find by rare chance only: caustics, or lights behind a gap.
 Applies lightSubpathsApply(const SceneTraits& traits, const LightReach& reach);
 
-// The solids that the camera is inside of.
-MediaStack mediaOfCamera(const Scene& scene, const Camera& camera);
-
 }  // namespace braid

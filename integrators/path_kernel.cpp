@@ -6,13 +6,12 @@
 #include "integrators/camera_paths.h"
 #include "renderer/core/error.h"
 #include "renderer/transport/mis.h"
+#include "renderer/transport/shadow_ray.h"
 
 namespace braid {
 
 namespace {
 
-// Shadow rays stop this share of their length before the light, so that its own triangle does not shadow it.
-constexpr float kShadowLength = 1 - 1e-4f;
 constexpr int kMaxNullCrossings = 256;
 
 // The normal by which lights are chosen at a hit.
@@ -124,16 +123,7 @@ bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Bsdf& 
 
   const float weight = light.delta ? 1.0f : powerHeuristic(light.pdfW, value.pdfW);
   shadow.contribution = path.throughput * value.f * light.radiance * (weight / light.pdfW);
-  shadow.ray.origin = offsetOrigin(hit, light.wi);
-  shadow.ray.direction = light.wi;
-  shadow.ray.tmax = kInfinity;
-  if (light.distance < kInfinity) {
-    // TRAP: aimed anew from the moved origin. On a large triangle the move is longer than the margin before a near
-    // light: the light would hide itself.
-    shadow.ray.direction = hit.position + light.wi * light.distance - shadow.ray.origin;
-    shadow.ray.tmax = kShadowLength;
-  }
-  shadow.ray.salt = mix32(path.salt ^ 0x51ed270bu) & ~kCameraRay;
+  shadow.ray = shadowRay(hit, light.wi, light.distance, mix32(path.salt ^ 0x51ed270bu) & ~kCameraRay);
   const bool volume = context_.summaryOf(hit).volume;
   if (!path.media.empty() || volume) {
     MediaStack media = path.media;

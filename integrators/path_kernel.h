@@ -51,10 +51,8 @@ class PathKernel {
         record_(record),
         roulette_(roulette),
         wantFeatures_(plan.features),
-        filtered_(context.scene.accel().filtered()) {
-    if (scene_.traits().has(kTraitVolume))
-      cameraMedia_ = mediaAround(scene_, plan.camera.position(), plan.camera.forward());
-  }
+        filtered_(context.scene.accel().filtered()),
+        cameraMedia_(mediaOfCamera(context.scene, plan.camera)) {}
 
   // Starts a path through pixel (x, y) of the full frame with the random numbers of `key`. At most kBatch before a
   // run().

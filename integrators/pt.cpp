@@ -27,25 +27,7 @@ class PathTracer final : public Integrator {
   }
 
   bool renderPass(const PassRequest& request, PassTarget& target) const override {
-    const Plan& plan = request.plan;
-    const std::unique_ptr<PassSampler> passSampler = pixelSampler(plan, request.pass);
-    const PassSampler& sampler = *passSampler;
-    return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>* record) {
-      PathKernel kernel(request.context, plan, sampler, record);
-      const int pixels = tile.width() * tile.height();
-      const auto pixelX = [&](int i) { return tile.x0 + i % tile.width(); };
-      const auto pixelY = [&](int i) { return tile.y0 + i / tile.width(); };
-      for (int first = 0; first < pixels; first += kBatch) {
-        const int last = std::min(pixels, first + kBatch);
-        kernel.clear();
-        for (int i = first; i < last; ++i)
-          kernel.start(pixelX(i), pixelY(i), pixelKey(sampler, plan, pixelX(i), pixelY(i)));
-        kernel.run();
-        for (int i = first; i < last; ++i) storeSample(request, pixelX(i), pixelY(i), kernel.sample(i - first), target);
-      }
-      return TileCounts{static_cast<uint64_t>(tile.width()) * static_cast<uint64_t>(tile.height()), kernel.rayCount,
-                        kernel.shadowRayCount};
-    });
+    return renderCameraPaths(*this, request, target);
   }
 };
 

@@ -78,30 +78,27 @@ bool PhotonMapper::renderPass(const PassRequest& request, PassTarget& target) co
   return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>*) {
     PhotonEyeBatch batch(request.context, plan, eyeSampler, cameraMedia);
     std::array<Spectrum, kBatch> bias;
-    const int pixels = tile.width() * tile.height();
-    const auto pixelX = [&](int i) { return tile.x0 + i % tile.width(); };
-    const auto pixelY = [&](int i) { return tile.y0 + i / tile.width(); };
-    for (int first = 0; first < pixels; first += kBatch) {
-      const int last = std::min(pixels, first + kBatch);
-      batch.clear();
-      bias.fill(Spectrum(0));
-      for (int i = first; i < last; ++i)
-        batch.start(pixelX(i), pixelY(i), pixelKey(eyeSampler, plan, pixelX(i), pixelY(i)));
-      batch.run([&](int i, const SubpathVertex& vertex) {
-        bias[static_cast<size_t>(i)] = addPhotons(grid, vertex, plan, static_cast<double>(paths), batch.sample(i));
-      });
-      for (int i = first; i < last; ++i) {
-        const PathSample& sample = batch.sample(i - first);
-        storeSample(request, pixelX(i), pixelY(i), sample, target);
-        if (!target.wantsBias()) continue;
-        const float largest = maxComponent(sample.radiance), clamp = plan.settings.clamp;
-        const float scale = clamp > 0 && largest > clamp ? clamp / largest : 1.0f;
-        target.bias(pixelX(i) - plan.window.x0, pixelY(i) - plan.window.y0,
-                    bias[static_cast<size_t>(i - first)] * scale);
-      }
-    }
-    return TileCounts{static_cast<uint64_t>(tile.width()) * static_cast<uint64_t>(tile.height()), batch.rayCount(),
-                      batch.shadowRayCount};
+    forEachBatch(
+        tile,
+        [&](int i, int x, int y) {
+          if (i == 0) batch.clear();
+          batch.start(x, y, pixelKey(eyeSampler, plan, x, y));
+        },
+        [&] {
+          bias.fill(Spectrum(0));
+          batch.run([&](int i, const SubpathVertex& vertex) {
+            bias[static_cast<size_t>(i)] = addPhotons(grid, vertex, plan, static_cast<double>(paths), batch.sample(i));
+          });
+        },
+        [&](int i, int x, int y) {
+          const PathSample& sample = batch.sample(i);
+          storeSample(request, x, y, sample, target);
+          if (!target.wantsBias()) return;
+          const float largest = maxComponent(sample.radiance), clamp = plan.settings.clamp;
+          const float scale = clamp > 0 && largest > clamp ? clamp / largest : 1.0f;
+          target.bias(x - plan.window.x0, y - plan.window.y0, bias[static_cast<size_t>(i)] * scale);
+        });
+    return TileCounts{pixelCount(tile), batch.rayCount(), batch.shadowRayCount};
   });
 }
 

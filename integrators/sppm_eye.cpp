@@ -6,13 +6,11 @@
 #include "integrators/camera_paths.h"
 #include "renderer/core/error.h"
 #include "renderer/transport/mis.h"
+#include "renderer/transport/shadow_ray.h"
 
 namespace braid {
 
 namespace {
-
-// Shadow rays stop this share of their length before the light, so that its own triangle does not shadow it.
-constexpr float kShadowLength = 1 - 1e-4f;
 
 WalkSettings eyeSettings(const Plan& plan) {
   WalkSettings s;
@@ -164,14 +162,8 @@ void PhotonEyeBatch::sampleLight(int index, const SubpathVertex& vertex, const L
   if (!reflects && context_.summaryOf(hit).volume) media.cross(hit.mesh->material, hit.front);
   contribution *= mediaTransmittance(scene_, media, light.distance);
 
-  RayQuery ray{offsetOrigin(hit, light.wi), light.wi, kInfinity,
-               sampler_.salt(vertex.key, 0x10000u + static_cast<uint32_t>(vertex.segments)) & ~kCameraRay};
-  if (light.distance < kInfinity) {
-    // Aimed anew from the moved origin, as in the path tracer.
-    ray.direction = hit.position + light.wi * light.distance - ray.origin;
-    ray.tmax = kShadowLength;
-  }
-  shadowRays_.set(shadowCount_, ray);
+  const uint32_t salt = sampler_.salt(vertex.key, 0x10000u + static_cast<uint32_t>(vertex.segments)) & ~kCameraRay;
+  shadowRays_.set(shadowCount_, shadowRay(hit, light.wi, light.distance, salt));
   shadow_[static_cast<size_t>(shadowCount_)] = {index, contribution, forFeatures};
   if (++shadowCount_ == kBatch) traceShadows();
 }

@@ -40,6 +40,23 @@ bool forEachTile(const PassRequest& request, const Render& render) {
   return !cancelled;
 }
 
+// Calls start(i, x, y) for up to kBatch pixels of the tile, full-frame coordinates and i from 0, then finish() and
+// store(i, x, y) for the same pixels, until the tile is done.
+template <class Start, class Finish, class Store>
+void forEachBatch(const PixelWindow& tile, const Start& start, const Finish& finish, const Store& store) {
+  const int width = tile.width(), pixels = width * tile.height();
+  for (int first = 0; first < pixels; first += kBatch) {
+    const int last = std::min(pixels, first + kBatch);
+    for (int p = first; p < last; ++p) start(p - first, tile.x0 + p % width, tile.y0 + p / width);
+    finish();
+    for (int p = first; p < last; ++p) store(p - first, tile.x0 + p % width, tile.y0 + p / width);
+  }
+}
+
+inline uint64_t pixelCount(const PixelWindow& w) {
+  return static_cast<uint64_t>(w.width()) * static_cast<uint64_t>(w.height());
+}
+
 // Hands a path's result to the film: clamped only when asked to.
 inline void storeSample(const PassRequest& request, int x, int y, const PathSample& sample, PassTarget& target) {
   const Plan& plan = request.plan;
@@ -53,6 +70,24 @@ inline void storeSample(const PassRequest& request, int x, int y, const PathSamp
     request.statistics->rejectedPixel = static_cast<int64_t>(y) * plan.settings.width + x;
   if (plan.features) target.features(px, py, sample.features);
   if (target.wantsCoverage()) target.coverage(px, py, sample.coverage);
+}
+
+// A pass of one camera path for every pixel, followed by the path kernel with the integrator's random numbers and
+// roulette. Returns false when cancelled.
+inline bool renderCameraPaths(const Integrator& integrator, const PassRequest& request, PassTarget& target) {
+  const Plan& plan = request.plan;
+  const std::unique_ptr<PassSampler> sampler = integrator.pixelSampler(plan, request.pass);
+  return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>* record) {
+    PathKernel kernel(request.context, plan, *sampler, record, integrator.roulette());
+    forEachBatch(
+        tile,
+        [&](int i, int x, int y) {
+          if (i == 0) kernel.clear();
+          kernel.start(x, y, integrator.pixelKey(*sampler, plan, x, y));
+        },
+        [&] { kernel.run(); }, [&](int i, int x, int y) { storeSample(request, x, y, kernel.sample(i), target); });
+    return TileCounts{pixelCount(tile), kernel.rayCount, kernel.shadowRayCount};
+  });
 }
 
 }  // namespace braid

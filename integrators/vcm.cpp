@@ -101,8 +101,7 @@ class VertexConnectionAndMerging final : public Integrator {
     return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>*) {
       BidirectionalKernel kernel(request, lights, eyeSampler, cameraMedia, target, nullptr, &merging);
       renderTile(kernel, tile);
-      return TileCounts{static_cast<uint64_t>(tile.width()) * static_cast<uint64_t>(tile.height()), kernel.rayCount(),
-                        kernel.shadowRayCount()};
+      return TileCounts{pixelCount(tile), kernel.rayCount(), kernel.shadowRayCount()};
     });
   }
 

@@ -338,4 +338,15 @@ inline bool identical(const Rgb<float>& a, const Rgb<float>& b) {
   return identical(a[0], b[0]) && identical(a[1], b[1]) && identical(a[2], b[2]);
 }
 
+// A case of the given size, everything else as by default.
+inline Case caseOf(int width, int height, uint64_t samples, uint64_t seed = 1, double light = 1) {
+  CaseOptions o;
+  o.width = width;
+  o.height = height;
+  o.samples = samples;
+  o.seed = seed;
+  o.light = light;
+  return makeCase(o);
+}
+
 }  // namespace braid::test

@@ -13,32 +13,18 @@
 
 #include "renderer/film/error_map.h"
 #include "renderer/film/exr.h"
+#include "tests/command_line.h"
 #include "tests/gltf_fixture.h"
 
 using namespace braid;
+using test::braidRun;
 using test::Folder;
 using test::Json;
+using test::readText;
+using test::Run;
 namespace fs = std::filesystem;
 
 namespace {
-
-struct Run {
-  int code = -1;
-  std::string out, err;
-};
-
-std::string read(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-// Runs braid through the shell; `before` may set limits.
-Run braidRun(const Folder& folder, const std::string& arguments, const std::string& before = "") {
-  const std::string out = folder.path / "stdout", err = folder.path / "stderr";
-  const std::string command = before + "'" BRAID_BINARY "' " + arguments + " >'" + out + "' 2>'" + err + "'";
-  const int status = std::system(("cd '" + folder.path.string() + "' && " + command).c_str());
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read(out), read(err)};
-}
 
 bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
@@ -243,7 +229,7 @@ TEST_CASE("An output that cannot be written is exit code 3 and leaves the previo
   INFO(run.err);
   CHECK(run.code == 3);
   CHECK(contains(run.err, "out.exr"));
-  CHECK(read(folder.path / "out.exr") == "the previous image");
+  CHECK(readText(folder.path / "out.exr") == "the previous image");
   for (const fs::directory_entry& entry : fs::directory_iterator(folder.path))
     CHECK_FALSE(contains(entry.path().filename(), ".tmp-"));
 }
@@ -259,7 +245,7 @@ TEST_CASE("An interrupt saves the image and is exit code 130") {
   arguments.push_back(nullptr);
   pid_t child = 0;
   REQUIRE(posix_spawn(&child, BRAID_BINARY, nullptr, nullptr, arguments.data(), environ) == 0);
-  for (int i = 0; i < 3000 && !contains(read(log), "\"progress\""); ++i)
+  for (int i = 0; i < 3000 && !contains(readText(log), "\"progress\""); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   REQUIRE(kill(child, SIGINT) == 0);
   int status = 0;
@@ -361,7 +347,7 @@ TEST_CASE("Reproducible renders are equal byte for byte") {
   const Folder folder;
   for (const char* name : {"a.exr", "b.exr"})
     REQUIRE(braidRun(folder, renderCommand(std::string("--size 40x30 --reproducible -o ") + name)).code == 0);
-  CHECK(read(folder.path / "a.exr") == read(folder.path / "b.exr"));
+  CHECK(readText(folder.path / "a.exr") == readText(folder.path / "b.exr"));
   const Run same = braidRun(folder, "compare a.exr b.exr --metric relMSE,MSE --max 0");
   CHECK(same.code == 0);
   CHECK(contains(same.out, "relMSE 0\n"));

@@ -12,32 +12,20 @@
 #include "renderer/core/error.h"
 #include "renderer/film/exr.h"
 #include "tests/combiner_fixture.h"
+#include "tests/command_line.h"
 #include "tests/gltf_fixture.h"
 #include "tests/render_fixture.h"
 #include "tools/estimates_file.h"
 
 using namespace braid;
+using test::braidRun;
 using test::Folder;
 using test::identical;
+using test::readText;
+using test::Run;
 namespace fs = std::filesystem;
 
 namespace {
-
-struct Run {
-  int code = -1;
-  std::string out, err;
-};
-
-std::string read(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-Run braidRun(const Folder& folder, const std::string& arguments) {
-  const std::string command = "cd '" + folder.path.string() + "' && '" BRAID_BINARY "' " + arguments + " >out 2>err";
-  const int status = std::system(command.c_str());
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read(folder.path / "out"), read(folder.path / "err")};
-}
 
 Run rendered(const Folder& folder, const std::string& rest) {
   const Run run = braidRun(folder, "render '" BRAID_SOURCE_DIR "/scenes/cornell.glb' -q --size 32x24 --spp 8 " + rest);

@@ -18,15 +18,6 @@ using namespace braid::test;
 
 namespace {
 
-Case caseOf(int width, int height, uint64_t samples, uint64_t seed = 1) {
-  CaseOptions o;
-  o.width = width;
-  o.height = height;
-  o.samples = samples;
-  o.seed = seed;
-  return makeCase(o);
-}
-
 // The weight of a pair in double, straight from the formula.
 double plainWeight(std::span<const NlmGuide> guides, int x, int y, int u, int v) {
   double largest = 0;

@@ -24,16 +24,6 @@ namespace {
 
 constexpr std::array kThresholds = {kPatchWelchThreshold, kPatchWelchWideThreshold};
 
-Case caseOf(int width, int height, uint64_t samples, uint64_t seed = 1, double light = 1) {
-  CaseOptions o;
-  o.width = width;
-  o.height = height;
-  o.samples = samples;
-  o.seed = seed;
-  o.light = light;
-  return makeCase(o);
-}
-
 const Features& featuresOf(const Case& c) { return *c.estimates.features; }
 
 std::vector<Rgb<float>> filtered(const Estimate& e, const Features* features, double z = kPatchWelchThreshold) {

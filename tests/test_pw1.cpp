@@ -16,15 +16,6 @@ using namespace braid::test;
 
 namespace {
 
-Case caseOf(int width, int height, uint64_t samples, uint64_t seed = 1) {
-  CaseOptions o;
-  o.width = width;
-  o.height = height;
-  o.samples = samples;
-  o.seed = seed;
-  return makeCase(o);
-}
-
 struct Filtered {
   std::vector<Rgb<float>> zeroOrder, firstOrder;
 };

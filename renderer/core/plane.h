@@ -56,4 +56,12 @@ struct Rgb {
   }
 };
 
+// (a + b) / 2 of two images of one size.
+inline Rgb<float> average(const Rgb<float>& a, const Rgb<float>& b) {
+  Rgb<float> out = a;
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t i = 0; i < out.size(); ++i) out[c][i] = 0.5f * a[c][i] + 0.5f * b[c][i];
+  return out;
+}
+
 }  // namespace braid

@@ -84,8 +84,7 @@ class Integrator {
   // by the path kernel.
   virtual std::unique_ptr<PassSampler> pixelSampler(const Plan&, uint64_t /*pass*/) const { return nullptr; }
   virtual uint64_t pixelKey(const PassSampler& sampler, const Plan& plan, int x, int y) const {
-    return sampler.itemKey(static_cast<uint64_t>(y) * static_cast<uint64_t>(plan.settings.width) +
-                           static_cast<uint64_t>(x));
+    return sampler.itemKey(pixelItem(plan, x, y));
   }
   virtual Roulette roulette() const { return {}; }
 };

@@ -27,6 +27,9 @@ void planIntegrators(const Scene& scene, const Settings& settings, const std::ve
     for (const Integrator* i : available) {
       if (name != "auto" && name != i->name()) continue;
       found = true;
+      const bool planned = std::any_of(plan.integrators.begin(), plan.integrators.end(),
+                                       [&](const PlannedIntegrator& p) { return p.integrator == i; });
+      if (planned) continue;
       const Applies applies = i->applies(scene.traits(), reach);
       // An integrator asked for by name runs even where the scene does not need it.
       const bool kept = applies.yes || name != "auto" || settings.full;

@@ -39,6 +39,11 @@ struct Plan {
   uint64_t hash() const;
 };
 
+// The item of pixel (x, y) of the full frame, by which its random numbers are keyed.
+inline uint64_t pixelItem(const Plan& plan, int x, int y) {
+  return static_cast<uint64_t>(y) * static_cast<uint64_t>(plan.settings.width) + static_cast<uint64_t>(x);
+}
+
 // `available` are the registered integrators. Throws Error(Usage) naming an unknown integrator and the known ones.
 Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& settings,
               const std::vector<const Integrator*>& available);

@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "renderer/transport/light_emission.h"
+#include "renderer/transport/shadow_ray.h"
 #include "renderer/transport/subpath.h"
 
 namespace braid {
@@ -80,13 +81,9 @@ bool seesLight(const TransportContext& context, const SubpathVertex& vertex, con
                              {block.u[slot::kLightU], block.u[slot::kLightV]}, light) ||
       isBlack(evaluateVertex(context, vertex, Transport::Radiance, light.wi).f))
     return false;
-  const Vec3 origin = offsetOrigin(vertex.hit, light.wi);
   ShadowBatch ray;
   bool hidden = true;
-  if (light.distance < kInfinity)
-    ray.set(0, {origin, vertex.hit.position + light.wi * light.distance - origin, 1 - 1e-4f, 0});
-  else
-    ray.set(0, {origin, light.wi, kInfinity, 0});
+  ray.set(0, shadowRay(vertex.hit, light.wi, light.distance, 0));
   context.scene.accel().occluded(ray, 1, &hidden);
   return !hidden;
 }

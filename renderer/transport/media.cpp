@@ -28,4 +28,8 @@ MediaStack mediaAround(const Scene& scene, const Vec3& point, const Vec3& direct
   return around;
 }
 
+MediaStack mediaOfCamera(const Scene& scene, const Camera& camera) {
+  return scene.traits().has(kTraitVolume) ? mediaAround(scene, camera.position(), camera.forward()) : MediaStack();
+}
+
 }  // namespace braid

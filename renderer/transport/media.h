@@ -7,6 +7,7 @@
 
 #include <cstdint>
 
+#include "renderer/scene/camera.h"
 #include "renderer/scene/scene.h"
 
 namespace braid {
@@ -57,6 +58,9 @@ class MediaStack {
 // The solids around a point that no surface lies between it and, found by following a ray to infinity: what is left
 // without having been entered was around the start. For cameras and lights inside of solids.
 MediaStack mediaAround(const Scene& scene, const Vec3& point, const Vec3& direction);
+
+// The solids that the camera is inside of.
+MediaStack mediaOfCamera(const Scene& scene, const Camera& camera);
 
 // Beer-Lambert transmittance over a distance in metres (KHR_materials_volume: attenuationColor after
 // attenuationDistance).

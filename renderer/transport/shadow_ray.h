@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rays that ask whether two points see each other, or a point a light.
+#pragma once
+
+#include "renderer/transport/hit.h"
+
+namespace braid {
+
+// Such rays stop this share of their length before their end, so that its own triangle does not hide it.
+inline constexpr float kShadowLength = 1 - 1e-4f;
+
+// From one point to another, both already lifted off their surfaces.
+inline RayQuery connectionRay(const Vec3& from, const Vec3& to, uint32_t salt) {
+  return {from, to - from, kShadowLength, salt};
+}
+
+// From a hit to a light in the unit direction wi; the distance is infinite for directional lights and the environment.
+inline RayQuery shadowRay(const Hit& hit, const Vec3& wi, float distance, uint32_t salt) {
+  const Vec3 origin = offsetOrigin(hit, wi);
+  // TRAP: aimed anew from the moved origin. On a large triangle the move is longer than the margin before a near light:
+  // the light would hide itself.
+  if (distance < kInfinity) return connectionRay(origin, hit.position + wi * distance, salt);
+  return {origin, wi, kInfinity, salt};
+}
+
+}  // namespace braid
