@@ -34,8 +34,6 @@ const OptionInfo kOwnHalves{"double-shrinkage-own-halves", 0,
 
 constexpr int kRadius = 6;  // of the filter of the biased image's variance
 
-bool hasHalves(const Estimate& e) { return !e.half[0].empty() && !e.half[1].empty(); }
-
 // a + weight (b - a), not below 0.
 Rgb<float> blend(const Rgb<float>& a, const Rgb<float>& b, const Plane<float>& weight) {
   Rgb<float> out(a.width(), a.height());

@@ -60,6 +60,10 @@ void TileWeights::errorsOfRow(size_t c, int y) {
       eb[i] = static_cast<double>(yb[i]) - static_cast<double>(xa[i]);
       d[i] = choices_.fullError ? 0.70710678118654752 * (static_cast<double>(ya[i]) - static_cast<double>(yb[i])) : 0.0;
     }
+    if (!choices_.rootWeights) continue;
+    const float* root = rowOf(*choices_.rootWeights, samples_.x0, y);
+    for (double* e : {ea, eb, d})
+      for (size_t i = 0; i < width; ++i) e[i] *= static_cast<double>(root[i]);
   }
 }
 

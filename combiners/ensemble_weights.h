@@ -25,6 +25,8 @@ struct EnsembleChoices {
   bool nonNegative = true;
   bool shared = false;     // one weight for all channels, from the sum of their errors
   bool fullError = false;  // estimate the error of the mean of both halves instead of that of a half
+  // Square roots of the weights of pixels in the sums over patches; null: all 1.
+  const Plane<float>* rootWeights = nullptr;
 };
 
 // Minimises wᵀMw with sum(w) = 1, where M is the sum over a patch, clipped at the borders, of

@@ -29,11 +29,26 @@ Plane<float> varianceSamples(const Rgb<float> (&halves)[2]) {
 Rgb<float> meanVariance(const Estimate& e) {
   if (!e.variance.empty()) return e.variance;
   Rgb<float> out(e.mean.width(), e.mean.height());
-  if (e.half[0].empty() || e.half[1].empty()) return out;
+  if (!hasHalves(e)) return out;
   parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
     for (size_t c = 0; c < 3; ++c)
       for (size_t i = begin; i < end; ++i)
         out[c][i] = finiteFloat(0.25 * squaredDifference(e.half[0], e.half[1], i, c));
+  });
+  return out;
+}
+
+bool hasHalves(const Estimate& e) { return !e.half[0].empty() && !e.half[1].empty(); }
+
+Rgb<float> halfVariance(const Estimate& x, const Rgb<float>& variance, int h) {
+  Rgb<float> out(variance.width(), variance.height());
+  parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t i = begin; i < end; ++i) {
+        const double own = sqr(static_cast<double>(x.half[h][c][i]));
+        const double both = own + sqr(static_cast<double>(x.half[1 - h][c][i]));
+        out[c][i] = finiteFloat(4 * static_cast<double>(variance[c][i]) * (both > 0 ? own / both : 0.5));
+      }
   });
   return out;
 }
@@ -51,24 +66,24 @@ Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, c
   const int width = guide.width(), height = guide.height();
   const Plane<float> samples = squaredErrorSamples(halves, unbiased, variance);
   const Plane<float> spread = varianceSamples(halves);
-  const Plane<double> level =
-      boxMean(channelMean(width, height, [&](size_t i, size_t c) { return static_cast<double>(guide[c][i]); }), 1);
-  Plane<double> weight(width, height), bias(width, height);
-  parallelChunks(weight.size(), kChunk, [&](size_t begin, size_t end) {
+  Plane<double> unit(width, height), noise(width, height), bias(width, height);
+  parallelChunks(unit.size(), kChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
-      double v = 0;
-      for (size_t c = 0; c < 3; ++c) v += static_cast<double>(variance[c][i]) / 3;
-      weight[i] = 1 / (level[i] * level[i] + 0.01 + v);
-      bias[i] = weight[i] * (static_cast<double>(samples[i]) - static_cast<double>(spread[i]));
+      double v = 0, level = 0;
+      for (size_t c = 0; c < 3; ++c) {
+        v += static_cast<double>(variance[c][i]) / 3;
+        level += static_cast<double>(guide[c][i]) / 3;
+      }
+      unit[i] = level * level + 0.01;
+      noise[i] = static_cast<double>(spread[i]) / unit[i];
+      bias[i] = (static_cast<double>(samples[i]) - static_cast<double>(spread[i])) / (unit[i] + v);
     }
   });
-  weight = boxSum(weight, 7);
-  bias = boxSum(bias, 7);
-  const Plane<double> smooth = boxMean(spread, 1);
+  noise = boxMean(noise, 1);
+  bias = boxMean(bias, 7);
   Plane<float> out(width, height);
   parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i)
-      out[i] = finiteFloat(smooth[i] + std::max(0.0, weight[i] > 0 ? bias[i] / weight[i] : 0.0));
+    for (size_t i = begin; i < end; ++i) out[i] = finiteFloat(unit[i] * (noise[i] + std::max(0.0, bias[i])));
   });
   return out;
 }

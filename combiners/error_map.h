@@ -9,16 +9,25 @@ namespace braid {
 // The variance of the mean: the estimate's own, or (A - B)² / 4 where it brings none.
 Rgb<float> meanVariance(const Estimate& estimate);
 
+bool hasHalves(const Estimate& estimate);
+
+// The variance of half h (0 or 1), as far as combiners should trust it. Both halves together have 4 v, where v is the
+// variance of the mean; it is shared out by the squares of their values: twice v for halves that agree, all of it for
+// the one that holds an outlier. With 2 v for both, a half would keep 38 % of an outlier of its own that the result of
+// a James-Stein combination is rid of, and errors measured across halves would be those of worse images.
+Rgb<float> halfVariance(const Estimate& estimate, const Rgb<float>& variance, int h);
+
 // Unbiased but noisy: the squared error of `image` at every pixel, averaged over channels,
 //   ½ [(z_A - x_B)² + (z_B - x_A)²] - 2 v - ¼ (z_A - z_B)²,
 // where v is the variance of the mean x: z_A has seen no sample of x_B, whose variance is 2 v, and the last term turns
 // the error of a half into that of the mean of both. May be negative.
 Plane<float> squaredErrorSamples(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance);
 
-// The smoothed map: box3 of the variance ¼ (z_A - z_B)² plus the squared bias, if positive, box15(w (sample - ¼ (z_A -
-// z_B)²)) / box15(w), where w = 1 / (box3(mean of `guide`)² + 0.01 + v) is the weight of the relative error
-// (ALGORITHMS-BEYOND 8.3, steps 2 and 7). Its sum over the image is meant, not its pixels: where it is smallest it is
-// too small, by selection. The halves must be independent of each other.
+// The smoothed map: u (box3(¼ (z_A - z_B)² / u) + max(0, box15((sample - ¼ (z_A - z_B)²) / (u + v)))), the variance and
+// the squared bias, with u = (mean of `guide`)² + 0.01. Both are averaged as relative errors (ALGORITHMS-BEYOND 8.3,
+// steps 2 and 7, averages them as they are): a lamp would lend the dark pixels around it an error that is beyond
+// anything that they can have. Its sum over the image is meant, not its pixels: where it is smallest it is too small,
+// by selection. The halves must be independent of each other.
 Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
                       const Rgb<float>& guide);
 

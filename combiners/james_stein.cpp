@@ -11,11 +11,9 @@
 #include <utility>
 
 #include "combiners/error_map.h"
-#include "combiners/finite_float.h"
 #include "combiners/optimised_bias.h"
 #include "combiners/registry.h"
 #include "combiners/shrinkage.h"
-#include "renderer/core/parallel.h"
 
 namespace braid {
 
@@ -32,24 +30,6 @@ const OptionInfo kGlobal{"js-global", 0, "1: one factor for the whole image"};
 const OptionInfo kPositivePart{"js-positive-part", 1, "0: let factors be negative"};
 const OptionInfo kStride{"js-stride", 4, "Distance of the regression models in pixels"};
 const OptionInfo kGate{"js-gate", 0, "1: replace lone outliers of the unbiased image first"};
-
-bool hasHalves(const Estimate& e) { return !e.half[0].empty() && !e.half[1].empty(); }
-
-// Variance of half h. Both halves together have 4 v, which is shared out by the squares of their values: twice v for
-// halves that agree, all of it for the one that holds an outlier. With 2 v for both, a half would keep 38 % of an
-// outlier of its own that the result is rid of, and errors measured across halves would be those of worse images.
-Rgb<float> halfVariance(const Estimate& x, const Rgb<float>& variance, size_t h) {
-  Rgb<float> out(variance.width(), variance.height());
-  parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
-    for (size_t c = 0; c < 3; ++c)
-      for (size_t i = begin; i < end; ++i) {
-        const double own = sqr(static_cast<double>(x.half[h][c][i]));
-        const double both = own + sqr(static_cast<double>(x.half[1 - h][c][i]));
-        out[c][i] = finiteFloat(4 * static_cast<double>(variance[c][i]) * (both > 0 ? own / both : 0.5));
-      }
-  });
-  return out;
-}
 
 // The images that X, X^A and X^B are pulled towards.
 struct Targets {
@@ -134,8 +114,8 @@ MethodResult JamesStein::run(const MethodInputs& in) const {
   const Targets targets = targetsOf(in, result);
   ShrunkImage shrunk[2];
   for (int h = 0; halves && h < 2; ++h) {
-    shrunk[h] = jamesStein(x.half[h], halfVariance(x, variance, static_cast<size_t>(h)),
-                           crossed ? targets.crossed[1 - h] : targets.half[h], settings);
+    shrunk[h] = jamesStein(x.half[h], halfVariance(x, variance, h), crossed ? targets.crossed[1 - h] : targets.half[h],
+                           settings);
     out.half[h] = shrunk[h].image;
   }
   ShrunkImage full = crossed

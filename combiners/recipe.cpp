@@ -78,7 +78,7 @@ void RecipeMaker::fill(Step& step, const std::string& chosenBiased) {
   if (step.obstacle.empty() && needs.correlated) step.obstacle = fillCorrelated(step);
   if (step.obstacle.empty() && (needs.biased || !chosenBiased.empty()))
     step.obstacle = needs.biased ? fillBiased(step, chosenBiased) : "it takes no biased input";
-  if (step.obstacle.empty() && needs.bases > 0) step.obstacle = fillBases(step);
+  if (step.obstacle.empty() && (needs.bases > 0 || needs.anyBases)) step.obstacle = fillBases(step);
 }
 
 // What an estimate lacks for the needs, or nothing.
@@ -194,6 +194,9 @@ std::string RecipeMaker::fillBases(Step& step) {
         if (trial.add(name).empty()) keep(name);
       }
   }
+  if (needs.anyBases)
+    for (const EstimateFacts& e : facts_.estimates)
+      if (!e.unbiased && !std::count(step.bases.begin(), step.bases.end(), e.name)) keep(e.name);
   if (static_cast<int>(step.bases.size()) < needs.bases)
     return fmt::format("needs {} to choose from, there {}", plural(static_cast<uint64_t>(needs.bases), "base", "bases"),
                        step.bases.size() == 1 ? "is only " + step.bases[0] : fmt::format("are {}", step.bases.size()));
@@ -252,7 +255,7 @@ RecipeNeeds needsOf(const Recipe& recipe) {
   for (const Step& step : recipe.steps) {
     if (!step.obstacle.empty()) continue;
     const Needs needs = step.method->needs();
-    all.quarters |= needs.quarters;
+    all.quarters |= needs.quarters || needs.quartersHelp;
     all.features |= needs.features;
     all.checkpoints = std::max(all.checkpoints, needs.checkpoints);
   }

@@ -15,6 +15,7 @@ namespace {
 
 constexpr int kRadius = 6;
 constexpr double kWinsorise = 8;
+constexpr double kSignificance = 3;
 
 double at(const Rgb<float>& image, size_t i, size_t c) { return static_cast<double>(image[c][i]); }
 
@@ -57,8 +58,6 @@ Plane<double> trimmedMean(const Plane<float>& in) {
   return out;
 }
 
-bool hasHalves(const Estimate& e) { return !e.half[0].empty() && !e.half[1].empty(); }
-
 }  // namespace
 
 DoubleShrinkage doubleShrinkage(double unbiasedError, double biasedError, double priorError) {
@@ -90,7 +89,15 @@ Plane<float> biasedError(const Estimate& biased, const Estimate& unbiased, const
     });
     const std::vector<Plane<float>> smooth = jointFilter({&spread, &squaredBias}, features, kRadius);
     error = smooth[0];
-    for (size_t i = 0; i < error.size(); ++i) error[i] += std::max(0.0f, smooth[1][i]);
+    for (size_t i = 0; i < error.size(); ++i) {
+      double spare = 0, square = 0;
+      for (size_t c = 0; c < 3; ++c) {
+        if (!biased.biasVariance.empty()) spare += at(biased.biasVariance, i, c) / 3;
+        square += at(biased.bias, i, c) * at(biased.bias, i, c) / 3;
+      }
+      const float own = square > kSignificance * kSignificance * spare ? finiteFloat(square - spare) : 0.0f;
+      error[i] += std::max({0.0f, smooth[1][i], own});
+    }
   } else {
     const Plane<float> samples = hasHalves(biased) && hasHalves(unbiased)
                                      ? squaredErrorSamples(biased.half, unbiased, variance)

@@ -27,6 +27,7 @@ void addBench(CLI::App& app, Action& action);
 void addReplay(CLI::App& app, Action& action);
 void addCompare(CLI::App& app, std::function<int()>& action);
 void addCombine(CLI::App& app, Action& action);
+void addMerge(CLI::App& app, Action& action);
 void addSweep(CLI::App& app, Action& action);
 
 // The items between commas, without empty ones.

@@ -58,9 +58,7 @@ std::string varianceIs(const Plan& plan) {
 
 }  // namespace
 
-std::vector<Attribute> headerAttributes(const Scene& scene, const Session& session, const RenderResult& result,
-                                        const std::string& isa, bool timing) {
-  const Plan& plan = session.plan();
+std::vector<Attribute> planAttributes(const Scene& scene, const Plan& plan, const std::string& isa) {
   const Settings& s = plan.settings;
   std::vector<Attribute> list{
       text("Software", std::string("braid ") + BRAID_VERSION),
@@ -76,15 +74,28 @@ std::vector<Attribute> headerAttributes(const Scene& scene, const Session& sessi
       text("braid/filter", toString(s.filter)),
       integer("braid/maxDepth", static_cast<uint64_t>(s.maxDepth)),
       text("braid/varianceIs", varianceIs(plan)),
-      integer("samplesPerPixel", result.estimates->estimates.front().passes),
-      integer("braid/rejectedSamples", result.rejected),
       matrix("worldToCamera", plan.camera.worldToCamera()),
       matrix("worldToNDC", plan.camera.worldToNdc()),
   };
   if (s.clamp > 0) list.push_back(number("braid/clamp", static_cast<double>(s.clamp)));
-  for (Attribute& a : estimateAttributes(*result.estimates, timing))
+  return list;
+}
+
+std::vector<Attribute> passAttributes(const Estimates& estimates, double seconds, bool timing) {
+  uint64_t rejected = 0;
+  for (const Estimate& e : estimates.estimates) rejected += e.rejected;
+  std::vector<Attribute> list{integer("samplesPerPixel", estimates.estimates.front().passes),
+                              integer("braid/rejectedSamples", rejected)};
+  for (Attribute& a : estimateAttributes(estimates, timing))
     if (a.name != "braid/seed") list.push_back(std::move(a));
-  if (timing) list.push_back(number("renderTimeSeconds", result.seconds));
+  if (timing) list.push_back(number("renderTimeSeconds", seconds));
+  return list;
+}
+
+std::vector<Attribute> headerAttributes(const Scene& scene, const Session& session, const RenderResult& result,
+                                        const std::string& isa, bool timing) {
+  std::vector<Attribute> list = planAttributes(scene, session.plan(), isa);
+  for (Attribute& a : passAttributes(*result.estimates, result.seconds, timing)) list.push_back(std::move(a));
   return list;
 }
 

@@ -11,7 +11,14 @@
 
 namespace braid {
 
-// `timing`: also seconds, which differ between runs.
+// What does not depend on the passes: software, scene, plan, camera.
+std::vector<Attribute> planAttributes(const Scene& scene, const Plan& plan, const std::string& isa);
+
+// What does: samples, rejected ones, and what files say of every estimate. `timing`: also seconds, which differ between
+// runs; `seconds`: of the pass loops.
+std::vector<Attribute> passAttributes(const Estimates& estimates, double seconds, bool timing);
+
+// Both, of a render that has ended.
 std::vector<Attribute> headerAttributes(const Scene& scene, const Session& session, const RenderResult& result,
                                         const std::string& isa, bool timing);
 

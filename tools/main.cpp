@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
   addInfo(app, action);
   addCompare(app, action);
   addCombine(app, action);
+  addMerge(app, action);
   addSweep(app, action);
   addReplay(app, action);
   addBench(app, action);

@@ -1,17 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// `braid render`: a glTF scene to a multilayer EXR.
+// `braid render`: a glTF scene to a multilayer EXR, to a state that can be resumed, or to one machine's share of it.
+#include <charconv>
+#include <filesystem>
+
 #include <fmt/format.h>
 
 #include "integrators/registry.h"
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
-#include "renderer/film/exr.h"
+#include "renderer/film/output_file.h"
+#include "renderer/film/state_file.h"
 #include "tools/cli.h"
 #include "tools/combining.h"
 #include "tools/header.h"
 #include "tools/interrupt.h"
 #include "tools/output_options.h"
 #include "tools/progress_line.h"
+#include "tools/publisher.h"
+#include "tools/scene_identity.h"
+#include "version.h"
 
 namespace braid {
 
@@ -20,110 +27,209 @@ namespace {
 struct RenderOptions {
   SceneChoice scene;
   SampleChoice samples;
-  std::string output, png, aovs = "all", logJson, layerPrefix;
-  double exposure = 0;
-  bool quarters = false, history = false, floatHeadline = false, transparent = false, noTiming = false;
-  CombineChoice combine;
+  ImageOutput image;
+  std::string logJson, checkpoint, resumeFile, passes, saveEvery = "60";
+  bool resume = false, transparent = false;
+  double error = 0;
+
+  // What the run leaves behind.
+  std::vector<std::string> files() const {
+    std::vector<std::string> list = image.files();
+    if (!checkpoint.empty()) list.push_back(checkpoint);
+    return list;
+  }
 };
 
+// "A:B" with A < B.
+PassInterval parseInterval(const std::string& text) {
+  PassInterval i;
+  const char *begin = text.data(), *end = begin + text.size();
+  const auto first = std::from_chars(begin, end, i.begin);
+  bool ok = first.ec == std::errc() && first.ptr < end && *first.ptr == ':';
+  if (ok) {
+    const auto second = std::from_chars(first.ptr + 1, end, i.end);
+    ok = second.ec == std::errc() && second.ptr == end && i.begin < i.end && i.end <= kMaxPass;
+  }
+  if (!ok)
+    throw Error(ExitCode::Usage, "--passes '" + text + "': expected FIRST:END, passes from 0, END excluded, as 0:256");
+  return i;
+}
+
+Settings renderSettings(const RenderOptions& o) {
+  Settings settings = makeSettings(o.scene, o.samples);
+  settings.features = parseAovs(o.image.aovs) != AovSet::None;
+  settings.quarters = o.image.quarters;
+  settings.history = o.image.history;
+  settings.transparent = o.transparent;
+  if (o.error > 0 && o.samples.spp == 0 && o.samples.time.empty()) settings.spp = 0;
+  if (o.passes.empty()) return settings;
+  if (o.samples.spp > 0) throw Error(ExitCode::Usage, "--spp and --passes: --passes alone says how many");
+  const PassInterval passes = parseInterval(o.passes);
+  settings.firstRound = passes.begin;
+  settings.spp = passes.count();
+  return settings;
+}
+
+// The state to go on from, if there is one.
+std::optional<FilmState> earlierState(const RenderOptions& o, const Settings& settings) {
+  if (!o.resume) return std::nullopt;
+  const std::string& file = o.resumeFile.empty() ? o.checkpoint : o.resumeFile;
+  if (file.empty()) throw Error(ExitCode::Usage, "--resume: name a file, here or with --checkpoint");
+  // A job that is started again after a crash has the same command line as at first, when there was nothing to resume.
+  if (o.resumeFile.empty() && !std::filesystem::exists(file)) return std::nullopt;
+  FilmState state = readStateFile(file);
+  for (const EstimateState& e : state.estimates) {
+    const auto perRound = static_cast<uint64_t>(e.passesPerRound);
+    const uint64_t begin = settings.firstRound * perRound, end = begin + settings.spp * perRound;
+    if (!o.passes.empty() && !e.passes.empty() && (e.firstPass() < begin || e.endPass() > end))
+      throw Error(
+          ExitCode::BadInput,
+          fmt::format("{}: cannot be resumed: it holds the passes {}:{} of {}, which are not all of {}:{}: name "
+                      "the --passes that it was begun with",
+                      file, e.firstPass(), e.endPass(), e.name, begin, end));
+  }
+  return state;
+}
+
+// What an earlier run kept is kept on, whether or not this one's outputs need it.
+void keepAsBefore(const FilmState& state, Settings& settings) {
+  settings.quarters |= state.buckets == 4;
+  settings.features |= state.features.has_value();
+  for (const StateOption& option : state.identity.options)
+    settings.history |= option == StateOption{"keeping history", "on"};
+}
+
+// What has to be kept for combining the passes of all machines, of which a share has few.
+Recipe planCombiningOfAll(const Scene& scene, const CameraData& camera, Settings& settings,
+                          const std::vector<const Integrator*>& integrators, const CombineChoice& choice) {
+  Settings all = settings;
+  if (settings.spp > 0) all.spp += settings.firstRound;
+  Recipe recipe = planCombining(scene, camera, all, integrators, choice);
+  settings.quarters = all.quarters;
+  settings.features = all.features;
+  settings.history = all.history;
+  return recipe;
+}
+
+nlohmann::json errorOrNull(const std::optional<double>& error) {
+  return error ? nlohmann::json(*error) : nlohmann::json(nullptr);
+}
+
 nlohmann::json resultRecord(const RenderResult& r, const RenderOptions& o, double loadSeconds, const Scene& scene,
-                            double combineSeconds, double writeSeconds) {
-  nlohmann::json outputs = nlohmann::json::array({o.output});
-  if (!o.png.empty()) outputs.push_back(o.png);
+                            const WrittenImage& written) {
   return {{"status", r.reason == StopReason::Cancelled ? "interrupted" : "done"},
           {"reason", toString(r.reason)},
           {"spp", r.estimates->estimates.front().passes},
+          {"estimatedError", errorOrNull(written.error)},
           {"seconds",
            {{"load", loadSeconds},
             {"prepare", scene.buildTimes().prepare},
             {"hierarchy", scene.buildTimes().hierarchy},
             {"render", r.seconds},
-            {"combine", combineSeconds},
-            {"write", writeSeconds}}},
+            {"combine", written.combineSeconds},
+            {"write", written.writeSeconds}}},
           {"paths", r.paths},
           {"rays", r.rays + r.shadowRays},
           {"rejectedSamples", r.rejected},
-          {"outputs", outputs}};
+          {"outputs", o.files()}};
+}
+
+void tellResult(const RenderResult& r, const RenderOptions& o, const WrittenImage& written) {
+  for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
+  if (r.rejected > 0) fmt::print(stderr, "warning: {} non-finite or negative samples counted as 0\n", r.rejected);
+  if (r.firstRejected)
+    fmt::print(stderr, "one of them: braid replay {} --integrator {} --pass {} --pixel {},{} --size {} --seed {}\n",
+               o.scene.file, r.firstRejected->integrator, r.firstRejected->pass, r.firstRejected->x, r.firstRejected->y,
+               o.scene.size, o.samples.seed);
+  for (const std::string& text : written.timings) fmt::print(stderr, "{}\n", text);
+  std::string outputs;
+  for (const std::string& file : o.files()) {
+    fmt::print(stderr, "Saved: {}\n", file);
+    outputs += (outputs.empty() ? "" : ", ") + file;
+  }
+  const double perSecond = r.seconds > 0 ? 1e-6 / r.seconds : 0;
+  fmt::print(stderr, "{} spp in {} ({:.2f} M paths/s, {:.1f} M rays/s), {}stopped by {}: {}\n",
+             r.estimates->estimates.front().passes, formatSeconds(r.seconds), static_cast<double>(r.paths) * perSecond,
+             static_cast<double>(r.rays + r.shadowRays) * perSecond,
+             written.error ? fmt::format("estimated error {:.3g}, ", *written.error) : "", toString(r.reason), outputs);
+}
+
+void tellNews(const std::vector<Publication>& news, const RenderOptions& o, JsonLog& json) {
+  for (const Publication& p : news) {
+    if (!p.failure.empty()) {
+      if (!o.scene.quiet) fmt::print(stderr, "warning: {} (the render goes on)\n", p.failure);
+      json.write("warning", {{"text", p.failure}});
+    } else if (!p.image.cancelled) {
+      nlohmann::json record = {{"spp", p.spp},
+                               {"seconds", p.seconds},
+                               {"estimatedError", errorOrNull(p.image.error)},
+                               {"outputs", o.image.files()}};
+      if (!o.image.combine.wanted().empty()) record["combined"] = p.combined;
+      json.write("published", record);
+    }
+  }
+}
+
+void checkOutputs(const RenderOptions& o) {
+  if (o.files().empty()) throw Error(ExitCode::Usage, "nothing to write: give -o OUT.exr, --png or --checkpoint");
+  if (o.error > 0 && o.image.files().empty())
+    throw Error(ExitCode::Usage, "--error: there is no image to estimate it from: give -o OUT.exr");
+  for (const std::string& file : o.files()) {
+    checkWritable(file);
+    removeAbandoned(file);
+  }
+}
+
+// What the run comes to: interrupted, short of its target, or neither.
+int exitCode(const RenderResult& result, const RenderOptions& o, const WrittenImage& written) {
+  if (result.reason == StopReason::Cancelled) return static_cast<int>(ExitCode::Interrupted);
+  if (o.error <= 0 || result.reason == StopReason::Error || (written.error && *written.error <= o.error)) return 0;
+  fmt::print(stderr, "--error {} was not reached: the estimated error is {}: give more --spp or --time\n", o.error,
+             written.error ? fmt::format("{:.3g}", *written.error) : "not known");
+  return static_cast<int>(ExitCode::TargetNotReached);
 }
 
 int runRender(const RenderOptions& o) {
-  const AovSet aovs = parseAovs(o.aovs);
-  Settings settings = makeSettings(o.scene, o.samples);
-  settings.features = aovs != AovSet::None;
-  settings.quarters = o.quarters;
-  settings.history = o.history;
-  settings.transparent = o.transparent;
-  checkWritable(o.output);
-  if (!o.png.empty()) checkWritable(o.png);
+  Settings settings = renderSettings(o);
+  checkOutputs(o);
+  const double saveEvery = parseDuration(o.saveEvery);
   JsonLog json(o.logJson);
   const std::atomic<bool>& interrupted = installInterruptHandler();
+  std::optional<FilmState> earlier = earlierState(o, settings);
+  if (earlier) keepAsBefore(*earlier, settings);
 
   LoadTimes times;
   SceneData data = loadScene(o.scene, &times);
   const CameraData camera = chooseCamera(data, o.scene);
   const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene);
   const auto integrators = makeIntegrators();
-  const std::vector<std::string> wanted = o.combine.wanted();
-  const Recipe recipe = planCombining(*scene, camera, settings, pointersTo(integrators), o.combine);
-  requireRunnable(recipe, wanted);
+  const Recipe recipe = planCombiningOfAll(*scene, camera, settings, pointersTo(integrators), o.image.combine);
+  if (!o.image.files().empty()) requireRunnable(recipe, o.image.combine.wanted());
   Session session(*scene, makePlan(*scene, camera, settings, pointersTo(integrators)));
+  session.identify(BRAID_VERSION, BRAID_BUILD_FLAGS, sceneIdentity(o.scene, scene->data()),
+                   planAttributes(*scene, session.plan(), scene->accel().isa()));
   const std::string planText = session.plan().text() + recipeText(recipe);
   if (o.scene.verbose) fmt::print(stderr, "{}", planText);
   json.write("plan", {{"text", planText}, {"hash", hexString(session.plan().hash())}});
+  if (earlier) session.resume(std::move(*earlier), o.resumeFile.empty() ? o.checkpoint : o.resumeFile);
+  earlier.reset();
 
   ProgressLine line(o.scene.quiet);
-  RenderResult result = session.run(
+  Publisher publisher({o.image, o.checkpoint, saveEvery, o.error, settings.threads}, session);
+  const RenderResult result = session.run(
       [&](const Progress& p) {
+        tellNews(publisher.round(p), o, json);
         line.update(p);
         json.write("progress", {{"spp", p.round}, {"seconds", p.seconds}, {"secondsLeft", p.secondsLeft}});
         return true;
       },
-      &interrupted);
+      &interrupted, nullptr, &publisher.reached());
   line.finish();
 
-  Estimates estimates = *result.estimates;
-  estimates.attributes = headerAttributes(*scene, session, result, scene->accel().isa(), !o.noTiming);
-  const auto combineStart = std::chrono::steady_clock::now();
-  const PipelineResult combined = runCombining(estimates, o.combine, o.combine.options(), settings.threads);
-  const double combineSeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - combineStart).count();
-  const CombinedLayers layers(combined, wanted, o.combine.weights, !o.noTiming, estimates);
-  if (layers.headline()) result.image = *layers.headline();
-  ExrOptions exr;
-  exr.layers = layers.layers();
-  exr.history = o.history;
-  exr.aovs = aovs;
-  exr.quarters = o.quarters;
-  exr.floatHeadline = o.floatHeadline;
-  exr.layerPrefix = o.layerPrefix;
-  const auto writeStart = std::chrono::steady_clock::now();
-  const WriteReport report = writeExr(o.output, estimates, result.image, result.alpha ? &*result.alpha : nullptr, exr);
-  if (!o.png.empty()) writePng(o.png, result.image, static_cast<float>(o.exposure));
-  const double writeSeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - writeStart).count();
-
-  if (!o.scene.quiet) {
-    for (const std::string& text : combineWarnings(combined)) fmt::print(stderr, "warning: {}\n", text);
-    if (report.clampedToHalf > 0)
-      fmt::print(stderr, "warning: {}: {} headline values above 65504 were clamped to fit half floats: use --float\n",
-                 o.output, report.clampedToHalf);
-    if (result.rejected > 0)
-      fmt::print(stderr, "warning: {} non-finite or negative samples counted as 0\n", result.rejected);
-    if (result.firstRejected)
-      fmt::print(stderr, "one of them: braid replay {} --integrator {} --pass {} --pixel {},{} --size {} --seed {}\n",
-                 o.scene.file, result.firstRejected->integrator, result.firstRejected->pass, result.firstRejected->x,
-                 result.firstRejected->y, o.scene.size, o.samples.seed);
-    fmt::print(stderr, "{} spp in {} ({:.2f} M paths/s, {:.1f} M rays/s), stopped by {}\n",
-               result.estimates->estimates.front().passes, formatSeconds(result.seconds),
-               static_cast<double>(result.paths) / result.seconds * 1e-6,
-               static_cast<double>(result.rays + result.shadowRays) / result.seconds * 1e-6, toString(result.reason));
-    for (const PipelineOutput& out : combined.outputs)
-      if (out.ran())
-        fmt::print(stderr, "{} in {}, its inputs in {}\n", out.step.name, formatSeconds(out.seconds),
-                   formatSeconds(out.inputSeconds));
-    fmt::print(stderr, "Saved: {}\n", o.output);
-    if (!o.png.empty()) fmt::print(stderr, "Saved: {}\n", o.png);
-  }
-  json.write("end", resultRecord(result, o, times.load, *scene, combineSeconds, writeSeconds));
-  return result.reason == StopReason::Cancelled ? static_cast<int>(ExitCode::Interrupted) : 0;
+  const WrittenImage written = publisher.finish();
+  if (!o.scene.quiet) tellResult(result, o, written);
+  json.write("end", resultRecord(result, o, times.load, *scene, written));
+  return exitCode(result, o, written);
 }
 
 }  // namespace
@@ -133,27 +239,40 @@ void addRender(CLI::App& app, Action& action) {
   RenderOptions& o = *options;
   CLI::App* command = app.add_subcommand("render", "Render a scene to an EXR image");
   command->footer(
-      "Examples:\n  braid render scene.glb -o out.exr --spp 256\n  braid render scene.glb -o out.exr --time 2m --env "
-      "sky.hdr --png out.png");
+      "Examples:\n"
+      "  braid render scene.glb -o out.exr --spp 256\n"
+      "  braid render scene.glb -o out.exr --time 2m --env sky.hdr --png out.png\n"
+      "  braid render scene.glb -o out.exr --error 0.001 --time 1h\n"
+      "  braid render scene.glb -o out.exr --spp 4096 --checkpoint run.state --resume\n"
+      "  braid render scene.glb --passes 256:512 --checkpoint part1.state    (then: braid merge)");
   addSceneOptions(*command, o.scene);
   addSampleOptions(*command, o.samples);
-  command
-      ->add_option("--combine", o.combine.combine,
-                   "none, or denoisers and combiners separated by commas (--list); the last one is the image R G B")
-      ->capture_default_str();
-  addCombineOptions(*command, o.combine);
-  command->add_option("-o,--output", o.output, "EXR file to write")->required();
-  command->add_option("--png", o.png, "Also write a tone-mapped PNG");
-  command->add_option("--exposure", o.exposure, "Exposure of the PNG in stops")->capture_default_str();
-  command->add_option("--aovs", o.aovs, "Layers besides the image: none, features or all")->capture_default_str();
-  command->add_flag("--quarters", o.quarters, "Also write the four quarter buffers");
-  command->add_flag("--history", o.history, "Also write the variances after 1, 2, 4, ... samples, for combining later");
-  command->add_flag("--float", o.floatHeadline, "R G B as 32-bit floats");
+  addImageOptions(*command, o.image);
   command->add_flag("--transparent", o.transparent, "Alpha channel; camera rays that miss add nothing");
-  command->add_option("--layer-prefix", o.layerPrefix, "Put before every layer's name, e.g. ViewLayer");
-  command->add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
+  command
+      ->add_option("--error", o.error,
+                   "Stop when the estimated relative error of the image (relL2 of `compare`) is at most this")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--checkpoint", o.checkpoint, "Keep all sums in this file, to resume or merge");
+  CLI::Option* resume =
+      command
+          ->add_option(
+              "--resume", o.resumeFile,
+              "Go on from a checkpoint: the pixels are those of a run that was never interrupted; without FILE "
+              "from that of --checkpoint, if it exists")
+          ->expected(0, 1)
+          ->type_name("FILE");
+  command
+      ->add_option("--save-every", o.saveEvery,
+                   "While rendering, replace the outputs this often, besides after 1, 2, 4, ... samples; 0: only then")
+      ->capture_default_str();
+  command->add_option("--passes", o.passes,
+                      "Only the passes FIRST:END of every integrator: one machine's share, for `braid merge`");
   command->add_option("--log-json", o.logJson, "Progress and result as JSON lines, to a file or - for standard output");
-  command->callback([options, &action] { action = [options] { return runRender(*options); }; });
+  command->callback([options, resume, &action] {
+    options->resume = resume->count() > 0;
+    action = [options] { return runRender(*options); };
+  });
 }
 
 }  // namespace braid

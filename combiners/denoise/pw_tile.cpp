@@ -39,7 +39,7 @@ float inverseMeanDepth(const Features& features) {
 
 }  // namespace
 
-PatchWelchInput patchWelchInput(const Estimate& estimate, const Features* features) {
+PatchWelchInput patchWelchInput(const Estimate& estimate, const Features* features, bool robustVariance) {
   PatchWelchInput input;
   input.features = features;
   input.images = {&estimate.mean};
@@ -47,7 +47,7 @@ PatchWelchInput patchWelchInput(const Estimate& estimate, const Features* featur
     input.images.push_back(&estimate.half[0]);
     input.images.push_back(&estimate.half[1]);
   }
-  input.variance = regularisedVariance(estimate);
+  input.variance = regularisedVariance(estimate, robustVariance);
   input.passes = passesOf(estimate);
   if (features) input.depthScale = inverseMeanDepth(*features);
   return input;

@@ -32,7 +32,7 @@ struct PatchWelchInput {
 
 // The input of an estimate. Its variance is empty where nothing is known of it (see regularisedVariance); there is
 // nothing to filter then.
-PatchWelchInput patchWelchInput(const Estimate& estimate, const Features* features);
+PatchWelchInput patchWelchInput(const Estimate& estimate, const Features* features, bool robustVariance = false);
 
 // Contiguous copies of the pixels of a rectangle. Non-finite values are zero. Rows are padded so that whole vectors
 // may be read past their ends.

@@ -25,21 +25,25 @@ Plane<float> varianceFromHalves(const Plane<float>& a, const Plane<float>& b, ui
 }
 
 // Shrinks `v` towards its box mean; `own` is the weight of the pixel's own value against the box's.
-void shrink(Plane<float>& v, double own) {
-  const Plane<double> box = boxSum(v, kBoxRadius);
+void shrink(Plane<float>& v, double own, bool robust) {
+  Plane<float> values = v;
+  if (robust)
+    for (float& value : values.data) value = std::sqrt(std::sqrt(value));
+  const Plane<double> box = boxSum(values, kBoxRadius);
   parallelRows(v.height, [&](int y) {
     const int rows = patchCount(y, kBoxRadius, 0, v.height);
     for (int x = 0; x < v.width; ++x) {
       const double mean = box.at(x, y) / (rows * patchCount(x, kBoxRadius, 0, v.width));
+      const double prior = robust ? sqr(sqr(mean)) : mean;
       float& value = v.at(x, y);
-      value = static_cast<float>((own * static_cast<double>(value) + kPriorWeight * mean) / (own + kPriorWeight));
+      value = static_cast<float>((own * static_cast<double>(value) + kPriorWeight * prior) / (own + kPriorWeight));
     }
   });
 }
 
 }  // namespace
 
-Rgb<float> regularisedVariance(const Estimate& estimate) {
+Rgb<float> regularisedVariance(const Estimate& estimate, bool robust) {
   const uint64_t n = passesOf(estimate);
   const bool halves = !estimate.half[0].empty() && !estimate.half[1].empty() && n >= 2;
   const bool known = !estimate.variance.empty() && n >= 2;
@@ -53,7 +57,7 @@ Rgb<float> regularisedVariance(const Estimate& estimate) {
       out[c] = estimate.variance[c];
       for (float& v : out[c].data) v = finiteVariance(v);
     }
-    shrink(out[c], fromHalves ? 0.0 : static_cast<double>(n - 1));
+    shrink(out[c], fromHalves ? 0.0 : static_cast<double>(n - 1), robust);
   }
   return out;
 }

@@ -17,6 +17,10 @@ inline uint64_t passesOf(const Estimate& estimate) { return estimate.passes > 0 
 // clipped at the borders. For fewer than four passes, or when V is not known, the box of (A - B)² n_A n_B / n², which
 // has the same expectation; empty for a single pass and where there are no halves either. Finite, >= 0, in the units of
 // mean²; the variance of a half is twice that.
-Rgb<float> regularisedVariance(const Estimate& estimate);
+//
+// `robust`: the fourth power of the box of V^¼ in place of the box of V. A few pixels that are much noisier than the
+// others, such as the mirror image of a lamp, then lend them none of their variance, with which a filter would take the
+// lamp for noise; but where noise is rare and strong, pixels that it has not hit yet look more certain than they are.
+Rgb<float> regularisedVariance(const Estimate& estimate, bool robust = false);
 
 }  // namespace braid

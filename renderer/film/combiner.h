@@ -41,8 +41,12 @@ struct Needs {
   bool biased = false;      // a smooth image with halves: a denoiser's, a photon map's or another combiner's
   bool correlated = false;  // an estimate by common random numbers or gradients
   int bases = 0;            // images with halves to choose from
-  bool quarters = false;    // of the unbiased (and the correlated) estimate
-  bool features = false;    // works without, but worse
+  // Takes, beyond those `bases`, what there is: the bases or denoisers that a user names, and biased estimates such as
+  // photon maps.
+  bool anyBases = false;
+  bool quarters = false;      // of the unbiased (and the correlated) estimate
+  bool quartersHelp = false;  // works without, but worse
+  bool features = false;      // works without, but worse
   int checkpoints = 0;
   uint64_t passes = 2;     // of the unbiased estimate
   bool halves = true;      // of the unbiased and the biased image and the bases; false: works on the means alone

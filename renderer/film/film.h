@@ -124,6 +124,8 @@ class Accumulator {
   const Rgb<double>& sumOfSquares() const { return sumsq_; }
   static Accumulator fromSums(std::vector<Rgb<double>> sums, Rgb<double> sumOfSquares, std::vector<uint64_t> counts,
                               uint64_t rejected, uint64_t clampedSplats);
+  // Adds the sums of other passes, of an accumulator of the same size and buckets.
+  void add(const Accumulator& other);
 
  private:
   Rgb<float> meanOfBuckets(int first, int step) const;
@@ -154,6 +156,7 @@ class FeatureAccumulator {
   const std::vector<Plane<double>>& sumsOfSquares() const { return sumsq_; }
   static FeatureAccumulator fromSums(std::vector<Plane<double>> sumsA, std::vector<Plane<double>> sumsB,
                                      std::vector<Plane<double>> sumsOfSquares, uint64_t passesA, uint64_t passesB);
+  void add(const FeatureAccumulator& other);
 
  private:
   std::vector<Plane<double>> sum_[2];  // per half, per component
@@ -168,6 +171,11 @@ class CoverageAccumulator {
   void commit(const PassTarget& target);
   uint64_t passes() const { return count_; }
   Plane<float> mean() const;
+
+  // Raw sums, for state files: what a file holds, and back.
+  const Plane<double>& sums() const { return sum_; }
+  static CoverageAccumulator fromSums(Plane<double> sums, uint64_t passes);
+  void add(const CoverageAccumulator& other);
 
  private:
   Plane<double> sum_;

@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <system_error>
 
+#include <fcntl.h>
+#include <signal.h>
 #include <unistd.h>
 
 #include "renderer/core/error.h"
@@ -35,7 +38,29 @@ std::string mendFor(int error) {
   }
 }
 
+// Makes a rename last; as good as the file system allows.
+void synchroniseFolder(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
+}
+
 }  // namespace
+
+void removeAbandoned(const std::string& path) {
+  const std::filesystem::path target(path);
+  const std::string begin = target.filename().string() + ".tmp-";
+  std::error_code ignored;
+  const std::filesystem::path folder = target.parent_path().empty() ? "." : target.parent_path();
+  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (name.compare(0, begin.size(), begin) != 0) continue;
+    const int process = std::atoi(name.c_str() + begin.size());
+    if (process > 0 && ::kill(process, 0) != 0 && errno == ESRCH) std::filesystem::remove(entry.path(), ignored);
+  }
+}
 
 OutputFile::OutputFile(const std::string& path, const std::string& extension)
     : IOProxy(path, IOProxy::Write),
@@ -69,7 +94,15 @@ void OutputFile::note(bool ok) {
   if (!ok && error_ == 0) error_ = errno != 0 ? errno : EIO;
 }
 
+// Without this a power failure may leave the new name with the old file's place on the disk: an empty file.
+bool OutputFile::synchronise() const {
+  if (std::fflush(file_) != 0) return false;
+  return ::fsync(::fileno(file_)) == 0 || errno == EINVAL || errno == ENOTSUP;  // not every file system can
+}
+
 void OutputFile::finish() {
+  errno = 0;
+  note(synchronise());
   errno = 0;
   const bool closed = std::fclose(file_) == 0;
   file_ = nullptr;
@@ -77,6 +110,7 @@ void OutputFile::finish() {
   if (error_ == 0) note(std::rename(temporary_.c_str(), target_.c_str()) == 0);
   if (error_ != 0) fail("");
   temporary_.clear();
+  synchroniseFolder(target_);
 }
 
 size_t OutputFile::write(const void* data, size_t size) {

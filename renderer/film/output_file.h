@@ -9,9 +9,9 @@
 
 namespace braid {
 
-// Writes to "path.tmp-PID.EXT" in the same folder; finish() renames it to `path`. Without finish() the temporary file
-// is removed and a previous file stays intact. OpenImageIO's writers do not check every write, so the first failure is
-// remembered here and reported by finish(), a full disk included.
+// Writes to "path.tmp-PID.EXT" in the same folder; finish() waits for the disk and renames it to `path`. Without
+// finish() the temporary file is removed and a previous file stays intact. OpenImageIO's writers do not check every
+// write, so the first failure is remembered here and reported by finish(), a full disk included.
 class OutputFile : public OIIO::Filesystem::IOProxy {
  public:
   // `extension` with its dot. Throws Error(OutputFailed).
@@ -35,11 +35,15 @@ class OutputFile : public OIIO::Filesystem::IOProxy {
 
  private:
   void note(bool ok);
+  bool synchronise() const;
 
   std::string target_, temporary_;
   std::FILE* file_ = nullptr;
   int64_t position_ = 0, size_ = 0;
   int error_ = 0;  // errno of the first failure
 };
+
+// Removes temporary files of `path` that processes of this machine left behind when they were killed.
+void removeAbandoned(const std::string& path);
 
 }  // namespace braid

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/session/session.h"
 
+#include <algorithm>
 #include <bit>
 #include <chrono>
 
+#include <fmt/format.h>
 #include <tbb/task_arena.h>
 
 #include "renderer/core/error.h"
+#include "renderer/session/pixel_options.h"
 
 namespace braid {
 
@@ -20,164 +23,228 @@ class Clock {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-template <class P, class Get>
-FeaturePlanes<P> featurePlanes(const Get& get) {
-  return {get([](const FeatureAccumulator& a, int c) { return a.mean(c); }),
-          {get([](const FeatureAccumulator& a, int c) { return a.halfMean(c, 0); }),
-           get([](const FeatureAccumulator& a, int c) { return a.halfMean(c, 1); })},
-          get([](const FeatureAccumulator& a, int c) { return a.variance(c); })};
-}
+bool isSet(const std::atomic<bool>* flag) { return flag && flag->load(); }
 
-Features collectFeatures(const FeatureAccumulator& a) {
-  const auto rgb = [&](int first) {
-    return [&a, first](auto plane) {
-      Rgb<float> planes;
-      for (int c = 0; c < 3; ++c) planes[static_cast<size_t>(c)] = plane(a, first + c);
-      return planes;
-    };
-  };
-  const auto single = [&](int component) { return [&a, component](auto plane) { return plane(a, component); }; };
-  return {featurePlanes<Rgb<float>>(rgb(0)), featurePlanes<Rgb<float>>(rgb(3)), featurePlanes<Plane<float>>(single(6)),
-          featurePlanes<Plane<float>>(single(7))};
+PassTarget makeTarget(const Plan& plan) {
+  bool splats = false, bias = false;
+  for (const PlannedIntegrator& p : plan.integrators) {
+    splats = splats || p.integrator->splats();
+    bias = bias || p.integrator->estimatesBias();
+  }
+  return PassTarget(plan.window.width(), plan.window.height(), splats, plan.features, plan.settings.transparent, bias);
 }
 
 }  // namespace
 
 const char* toString(StopReason reason) {
-  return reason == StopReason::Samples ? "samples" : reason == StopReason::Time ? "time" : "cancelled";
+  switch (reason) {
+    case StopReason::Samples:
+      return "samples";
+    case StopReason::Time:
+      return "time";
+    case StopReason::Error:
+      return "error";
+    case StopReason::Cancelled:
+      break;
+  }
+  return "cancelled";
 }
+
+// One run: what lasts as long as the pass loop.
+class Session::Loop {
+ public:
+  Loop(Session& session, const std::atomic<bool>* abandon, PassStatistics& statistics, RenderResult& result)
+      : session_(session),
+        plan_(session.plan_),
+        film_(session.film_),
+        abandon_(abandon),
+        statistics_(statistics),
+        result_(result),
+        target_(makeTarget(session.plan_)),
+        startSeconds_(session.film_.seconds) {
+    result_.rounds = result_.firstRound = film_.rounds();
+    for (size_t i = 0; i < plan_.integrators.size(); ++i) {
+      const Clock preparing;
+      preparations_.push_back(plan_.integrators[i].integrator->prepare(session_.context_, plan_));
+      film_.estimates[i].seconds += preparing.seconds();
+    }
+  }
+
+  // Whether the limits of the settings end the run; sets the reason then.
+  bool limitReached() {
+    const Settings& s = plan_.settings;
+    if (s.spp > 0 && result_.rounds >= s.spp) return true;
+    const bool late = s.seconds > 0 && seconds() >= s.seconds && result_.rounds > result_.firstRound;
+    if (late) result_.reason = StopReason::Time;
+    return late;
+  }
+
+  // The passes that are missing to the next round, of every integrator. False when abandoned.
+  bool round() {
+    for (size_t i = 0; i < plan_.integrators.size(); ++i) {
+      const Clock clock;
+      const uint64_t wanted = (result_.rounds + 1) * static_cast<uint64_t>(plan_.integrators[i].passesPerRound);
+      bool done = true;
+      while (done && film_.estimates[i].sums.passes() < wanted) done = pass(i);
+      film_.estimates[i].seconds += clock.seconds();
+      if (!done) return false;
+    }
+    ++result_.rounds;
+    film_.seconds = startSeconds_ + seconds();
+    if (plan_.settings.history && std::has_single_bit(result_.rounds)) session_.keepCheckpoints();
+    return true;
+  }
+
+  Progress progress() const {
+    const Settings& s = plan_.settings;
+    Progress p;
+    p.round = result_.rounds;
+    p.rounds = s.spp;
+    p.seconds = seconds();
+    p.rejected = film_.rejected();
+    const uint64_t done = p.round - result_.firstRound;
+    if (s.spp > 0 && done > 0)
+      p.secondsLeft = p.seconds / static_cast<double>(done) * static_cast<double>(s.spp - p.round);
+    if (s.seconds > 0) {
+      const double left = std::max(0.0, s.seconds - p.seconds);
+      p.secondsLeft = p.secondsLeft < 0 ? left : std::min(p.secondsLeft, left);
+    }
+    return p;
+  }
+
+  double seconds() const { return clock_.seconds(); }
+
+ private:
+  bool pass(size_t i) {
+    const Integrator& integrator = *plan_.integrators[i].integrator;
+    EstimateState& e = film_.estimates[i];
+    const uint64_t first = plan_.settings.firstRound * static_cast<uint64_t>(plan_.integrators[i].passesPerRound);
+    const uint64_t pass = e.passes.empty() ? first : e.endPass();
+    target_.clear();
+    if (!integrator.renderPass(
+            {session_.context_, plan_, pass, abandon_, &statistics_, nullptr, preparations_[i].get()}, target_))
+      return false;
+    const int64_t rejected = statistics_.rejectedPixel.load();
+    if (rejected >= 0 && !result_.firstRejected)
+      result_.firstRejected = {integrator.name(), pass, static_cast<int>(rejected % plan_.settings.width),
+                               static_cast<int>(rejected / plan_.settings.width)};
+    e.sums.commit(pass, target_);
+    e.addPass(pass);
+    if (i == 0 && film_.features) film_.features->commit(pass, target_);
+    if (i == 0 && film_.coverage) film_.coverage->commit(target_);
+    return true;
+  }
+
+  Session& session_;
+  const Plan& plan_;
+  FilmState& film_;
+  const std::atomic<bool>* abandon_;
+  PassStatistics& statistics_;
+  RenderResult& result_;
+  const Clock clock_;
+  PassTarget target_;
+  std::vector<std::shared_ptr<const Preparation>> preparations_;
+  const double startSeconds_;
+};
 
 Session::Session(const Scene& scene, Plan plan)
     : scene_(scene), plan_(std::move(plan)), context_(scene, plan_.settings.lightStrategy) {
   if (plan_.integrators.empty()) throw Error(ExitCode::Usage, "no integrator to run: name one with --integrator");
-  for (size_t i = 0; i < plan_.integrators.size(); ++i)
-    accumulators_.emplace_back(plan_.window.width(), plan_.window.height(), plan_.buckets,
-                               plan_.integrators[i].integrator->estimatesBias());
-  seconds_.assign(plan_.integrators.size(), 0.0);
-  if (plan_.features) features_ = std::make_unique<FeatureAccumulator>(plan_.window.width(), plan_.window.height());
-  if (plan_.settings.transparent)
-    coverage_ = std::make_unique<CoverageAccumulator>(plan_.window.width(), plan_.window.height());
+  const int width = plan_.window.width(), height = plan_.window.height();
+  film_.identity.isa = scene.accel().isa();
+  film_.identity.sceneHash = scene.data().contentHash;
+  film_.identity.options = pixelOptions(plan_);
+  film_.seed = plan_.settings.seed;
+  film_.window = plan_.window;
+  film_.fullWidth = plan_.settings.width;
+  film_.fullHeight = plan_.settings.height;
+  film_.buckets = plan_.buckets;
+  for (const PlannedIntegrator& p : plan_.integrators) {
+    EstimateState e;
+    e.name = p.integrator->name();
+    e.unbiased = p.integrator->unbiased();
+    e.correlation = p.integrator->correlation();
+    e.lowDiscrepancy = p.integrator->lowDiscrepancy(plan_.settings);
+    e.passesPerRound = p.passesPerRound;
+    e.sums = Accumulator(width, height, plan_.buckets, p.integrator->estimatesBias());
+    film_.estimates.push_back(std::move(e));
+  }
+  if (plan_.features) film_.features.emplace(width, height);
+  if (plan_.settings.transparent) film_.coverage.emplace(width, height);
+}
+
+void Session::identify(const std::string& version, const std::string& build,
+                       const std::vector<StateOption>& sceneOptions, std::vector<Attribute> attributes) {
+  film_.identity.version = version;
+  film_.identity.build = build;
+  film_.identity.options.insert(film_.identity.options.end(), sceneOptions.begin(), sceneOptions.end());
+  film_.attributes = std::move(attributes);
+}
+
+void Session::resume(FilmState state, const std::string& name) {
+  const std::string differs = difference(state.identity, film_.identity, true);
+  if (!differs.empty())
+    throw Error(ExitCode::BadInput,
+                fmt::format("{}: cannot be resumed: {}: render as it was begun, or begin anew", name, differs));
+  // Equal options make equal accumulators, unless the file was tampered with.
+  bool fits = state.estimates.size() == film_.estimates.size() && state.window == film_.window &&
+              state.buckets == film_.buckets && state.features.has_value() == film_.features.has_value() &&
+              state.coverage.has_value() == film_.coverage.has_value();
+  for (size_t i = 0; fits && i < film_.estimates.size(); ++i) {
+    const EstimateState &there = state.estimates[i], &here = film_.estimates[i];
+    fits = there.name == here.name && there.passesPerRound == here.passesPerRound &&
+           there.sums.keepsBias() == here.sums.keepsBias() && there.sums.width() == here.sums.width() &&
+           there.sums.height() == here.sums.height();
+  }
+  if (!fits) throw Error(ExitCode::BadInput, name + ": cannot be resumed: what it holds is not what its options say");
+  state.attributes = std::move(film_.attributes);
+  film_ = std::move(state);
 }
 
 RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bool>* cancel,
-                          const std::atomic<bool>* abandon) {
-  const Settings& settings = plan_.settings;
+                          const std::atomic<bool>* abandon, const std::atomic<bool>* reached) {
   PassStatistics statistics;
   RenderResult result;
-  tbb::task_arena arena(settings.threads > 0 ? settings.threads : tbb::task_arena::automatic);
+  const int threads = plan_.settings.threads;
+  tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
   arena.execute([&] {
-    bool splats = false, bias = false;
-    for (const PlannedIntegrator& p : plan_.integrators) {
-      splats = splats || p.integrator->splats();
-      bias = bias || p.integrator->estimatesBias();
-    }
-    PassTarget target(plan_.window.width(), plan_.window.height(), splats, plan_.features, plan_.settings.transparent,
-                      bias);
-    const Clock clock;
-    std::vector<std::shared_ptr<const Preparation>> preparations;
-    for (size_t i = 0; i < plan_.integrators.size(); ++i) {
-      const Clock preparing;
-      preparations.push_back(plan_.integrators[i].integrator->prepare(context_, plan_));
-      seconds_[i] += preparing.seconds();
-    }
-    const auto isSet = [](const std::atomic<bool>* flag) { return flag && flag->load(); };
-    for (;;) {
-      if (settings.spp > 0 && result.rounds >= settings.spp) break;
-      if (settings.seconds > 0 && clock.seconds() >= settings.seconds && result.rounds > 0) {
-        result.reason = StopReason::Time;
-        break;
-      }
-      bool abandoned = false;
-      for (size_t i = 0; i < plan_.integrators.size() && !abandoned; ++i) {
-        const Clock passClock;
-        for (int k = 0; k < plan_.integrators[i].passesPerRound && !abandoned; ++k) {
-          const uint64_t pass = accumulators_[i].passes();
-          target.clear();
-          abandoned = !plan_.integrators[i].integrator->renderPass(
-              {context_, plan_, pass, abandon, &statistics, nullptr, preparations[i].get()}, target);
-          if (abandoned) break;
-          const int64_t rejected = statistics.rejectedPixel.load();
-          if (rejected >= 0 && !result.firstRejected)
-            result.firstRejected = {plan_.integrators[i].integrator->name(), pass,
-                                    static_cast<int>(rejected % settings.width),
-                                    static_cast<int>(rejected / settings.width)};
-          accumulators_[i].commit(pass, target);
-          if (i == 0 && features_) features_->commit(pass, target);
-          if (i == 0 && coverage_) coverage_->commit(target);
-        }
-        seconds_[i] += passClock.seconds();
-      }
-      if (!abandoned) ++result.rounds;
-      if (settings.history && !abandoned && std::has_single_bit(result.rounds)) keepCheckpoints();
-      Progress p;
-      p.round = result.rounds;
-      p.rounds = settings.spp;
-      p.seconds = clock.seconds();
-      p.rejected = 0;
-      for (const Accumulator& a : accumulators_) p.rejected += a.rejected();
-      if (settings.spp > 0 && p.round > 0)
-        p.secondsLeft = p.seconds / static_cast<double>(p.round) * static_cast<double>(settings.spp - p.round);
-      if (settings.seconds > 0) {
-        const double left = std::max(0.0, settings.seconds - p.seconds);
-        p.secondsLeft = p.secondsLeft < 0 ? left : std::min(p.secondsLeft, left);
-      }
-      const bool goOn = !progress || progress(p);
+    Loop loop(*this, abandon, statistics, result);
+    while (!loop.limitReached()) {
+      const bool abandoned = !loop.round();
+      const bool goOn = !progress || progress(loop.progress());
       if (abandoned || !goOn || isSet(cancel)) {
         result.reason = StopReason::Cancelled;
         break;
       }
+      if (isSet(reached)) {
+        result.reason = StopReason::Error;
+        break;
+      }
     }
-    result.seconds = clock.seconds();
+    result.seconds = loop.seconds();
     result.estimates = snapshot();
+    result.alpha = alpha();
   });
   result.paths = statistics.paths;
   result.rays = statistics.rays;
   result.shadowRays = statistics.shadowRays;
-  for (const Accumulator& a : accumulators_) result.rejected += a.rejected();
+  result.rejected = film_.rejected();
   result.image = result.estimates->estimates.front().mean;
-  if (coverage_) result.alpha = coverage_->mean();
   return result;
 }
 
 std::shared_ptr<const Estimates> Session::snapshot() const {
-  auto e = std::make_shared<Estimates>();
-  e->width = plan_.window.width();
-  e->height = plan_.window.height();
-  e->window = plan_.window;
-  e->fullWidth = plan_.settings.width;
-  e->fullHeight = plan_.settings.height;
-  e->seed = plan_.settings.seed;
-  for (size_t i = 0; i < plan_.integrators.size(); ++i) {
-    const Accumulator& a = accumulators_[i];
-    Estimate estimate;
-    estimate.name = plan_.integrators[i].integrator->name();
-    estimate.correlation = plan_.integrators[i].integrator->correlation();
-    estimate.unbiased = plan_.integrators[i].integrator->unbiased();
-    estimate.passes = a.passes();
-    estimate.seconds = seconds_[i];
-    estimate.rejected = a.rejected();
-    estimate.mean = a.mean();
-    for (int h = 0; h < 2; ++h) estimate.half[h] = a.halfMean(h);
-    if (plan_.settings.quarters)
-      for (int k = 0; k < 4; ++k) estimate.quarter.push_back(a.bucketMean(k));
-    estimate.variance = a.variance(plan_.integrators[i].integrator->lowDiscrepancy(plan_.settings));
-    if (a.keepsBias()) {
-      estimate.bias = a.biasMean();
-      estimate.biasVariance = a.biasVariance();
-    }
-    e->estimates.push_back(std::move(estimate));
-  }
-  if (features_) e->features = collectFeatures(*features_);
-  e->history = history_;
-  return e;
+  return std::make_shared<const Estimates>(estimatesOf(film_, plan_.settings.quarters));
+}
+
+std::optional<Plane<float>> Session::alpha() const {
+  if (!film_.coverage) return std::nullopt;
+  return film_.coverage->mean();
 }
 
 void Session::keepCheckpoints() {
-  for (size_t i = 0; i < plan_.integrators.size(); ++i) {
-    const Accumulator& a = accumulators_[i];
-    history_[plan_.integrators[i].integrator->name()].push_back(
-        {a.passes(), seconds_[i], a.variance(plan_.integrators[i].integrator->lowDiscrepancy(plan_.settings))});
-  }
+  for (EstimateState& e : film_.estimates)
+    e.history.push_back({e.sums.passes(), e.seconds, e.sums.variance(e.lowDiscrepancy)});
 }
 
 }  // namespace braid

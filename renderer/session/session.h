@@ -5,24 +5,23 @@
 
 #include <atomic>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "renderer/core/log.h"
-#include "renderer/film/estimates.h"
+#include "renderer/film/film_state.h"
 #include "renderer/session/integrator.h"
 #include "renderer/session/plan.h"
 
 namespace braid {
 
-enum class StopReason { Samples, Time, Cancelled };
+enum class StopReason { Samples, Time, Error, Cancelled };
 const char* toString(StopReason reason);
 
 struct Progress {
-  uint64_t round = 0;       // rounds done
+  uint64_t round = 0;       // rounds done, those of a resumed state included
   uint64_t rounds = 0;      // planned, 0: no limit
   double seconds = 0;       // since the loop started
   double secondsLeft = -1;  // estimate, negative: unknown
@@ -34,8 +33,9 @@ struct RenderResult {
   Rgb<float> image;                   // the headline
   std::optional<Plane<float>> alpha;  // with a transparent background
   StopReason reason = StopReason::Samples;
-  uint64_t rounds = 0;
-  double seconds = 0;  // of the pass loop
+  uint64_t rounds = 0;      // those of a resumed state included
+  uint64_t firstRound = 0;  // how many of them were resumed
+  double seconds = 0;       // of the pass loop, in this run
   uint64_t paths = 0, rays = 0, shadowRays = 0;
   uint64_t rejected = 0;
   // One rejected sample, if any, so that its path can be replayed.
@@ -55,29 +55,37 @@ class Session {
   // Called after each round; return false to end the render (what is done is kept).
   using ProgressCallback = std::function<bool(const Progress&)>;
 
-  // Runs the plan. `cancel`: set by a signal handler or another thread; the pass in flight is finished. `abandon`: the
-  // pass in flight is dropped.
+  // Goes on from a state: run() then gives the pixels of a run that was never interrupted. Throws Error(BadInput) with
+  // a sentence that begins with `name` when the state belongs to another scene, other options or another braid.
+  void resume(FilmState state, const std::string& name);
+
+  // Runs the plan. Set by a signal handler or another thread: `cancel`, the pass in flight is finished; `abandon`, the
+  // pass in flight is dropped; `reached`, the image is as good as it was meant to be.
   RenderResult run(const ProgressCallback& progress = {}, const std::atomic<bool>* cancel = nullptr,
-                   const std::atomic<bool>* abandon = nullptr);
+                   const std::atomic<bool>* abandon = nullptr, const std::atomic<bool>* reached = nullptr);
 
   const Plan& plan() const { return plan_; }
   const TransportContext& context() const { return context_; }
 
-  // The estimates so far; call it from the progress callback or after run().
+  // The estimates so far; call these from the progress callback or after run().
   std::shared_ptr<const Estimates> snapshot() const;
+  std::optional<Plane<float>> alpha() const;
+  const FilmState& state() const { return film_; }
+
+  // Completes what tells states apart with what the session cannot know, before resume(): the version and build of
+  // braid, options that change the scene; and what image headers say of it.
+  void identify(const std::string& version, const std::string& build, const std::vector<StateOption>& sceneOptions,
+                std::vector<Attribute> attributes);
 
  private:
+  class Loop;
   // Adds the present state of all estimates to the history.
   void keepCheckpoints();
 
   const Scene& scene_;
   Plan plan_;
   TransportContext context_;
-  std::vector<Accumulator> accumulators_;
-  std::vector<double> seconds_;
-  std::map<std::string, std::vector<Checkpoint>> history_;
-  std::unique_ptr<FeatureAccumulator> features_;
-  std::unique_ptr<CoverageAccumulator> coverage_;  // with a transparent background
+  FilmState film_;
 };
 
 }  // namespace braid

@@ -19,9 +19,10 @@ struct Settings {
   int width = 1280, height = 720;  // full frame, pixels
   std::optional<PixelWindow> crop;
   std::vector<std::string> integrators{"pt"};
-  uint64_t spp = 64;   // passes of each integrator; 0: no limit
-  double seconds = 0;  // wall-clock limit of the pass loop; 0: none
-  int maxDepth = 32;   // segments of a path, the one from the camera included
+  uint64_t spp = 64;        // passes of each integrator, those of a resumed state included; 0: no limit
+  uint64_t firstRound = 0;  // where the rounds begin: more than 0 for the later shares of a render on several machines
+  double seconds = 0;       // wall-clock limit of the pass loop; 0: none
+  int maxDepth = 32;        // segments of a path, the one from the camera included
   uint64_t seed = 0;
   SamplerKind sampler = SamplerKind::Sobol;
   PixelFilter filter = PixelFilter::Box;

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+// "auto": the best image that the inputs allow, without a choice for the user. The rule and its reasons are in
+// combiners/auto.md; its steps are
+//   1. x: the unbiased image, fused with photon maps by their estimated errors (fused_estimate.h);
+//   2. bases: patch-Welch filters of x, and the denoisers that the user asked for;
+//   3. candidates: every base, and x shrunk towards it (shrinkage.h);
+//   4. an ensemble of the candidates, with errors measured across halves (ensemble_weights.h);
+//   5. outliers that one or two quarters alone speak for are replaced (despike.h);
+//   6. the error map (error_map.h), plus the squared bias that the photon maps admit.
+// x itself is no candidate: halves cannot see the error of an outlier in the half that holds it.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "combiners/channel_mean.h"
+#include "combiners/box_mean.h"
+#include "combiners/denoise/pw1_filter.h"
+#include "combiners/denoise/pw_filter.h"
+#include "combiners/despike.h"
+#include "combiners/ensemble_weights.h"
+#include "combiners/error_map.h"
+#include "combiners/fused_estimate.h"
+#include "combiners/recipe.h"
+#include "combiners/registry.h"
+#include "combiners/shrinkage.h"
+#include "combiners/weight_filter.h"
+
+namespace braid {
+
+namespace {
+
+const OptionInfo kPatch{"auto-patch", 15, "Width in pixels of the patches that errors are summed over"};
+const OptionInfo kFuse{"auto-fuse", 1, "0: photon maps are bases, not part of the image that is denoised"};
+const OptionInfo kShrink{"auto-shrink", 1, "0: bases only, without James-Stein shrinkage towards them"};
+const OptionInfo kDespike{"auto-despike", 1, "0: keep outliers"};
+
+constexpr uint64_t kFewestPasses = 4;       // fewer: the first filter alone
+constexpr uint64_t kFirstOrderPasses = 64;  // fewer: slopes fit noise
+// How much of a pixel's variance counts as its scale in sums of relative errors: without any, single outliers decide;
+// with all of it, filters that keep outliers go unpunished.
+constexpr double kVarianceShare = 0.3;
+
+class Auto : public Method {
+ public:
+  const char* name() const override { return "auto"; }
+  const char* description() const override {
+    return "The best image that the inputs allow: photon maps, filters and shrinkage, combined by measured errors";
+  }
+  MethodKind kind() const override { return MethodKind::Combiner; }
+  Needs needs() const override {
+    Needs needs;
+    needs.anyBases = true;
+    needs.features = true;
+    needs.quartersHelp = true;
+    return needs;
+  }
+  std::vector<OptionInfo> options() const override { return {kPatch, kFuse, kShrink, kDespike}; }
+  MethodResult run(const MethodInputs& in) const override;
+};
+
+Estimate asEstimate(std::vector<Rgb<float>> images, const char* name) {
+  Estimate e;
+  e.name = name;
+  e.mean = std::move(images[0]);
+  for (size_t h = 0; h + 1 < images.size(); ++h) e.half[h] = std::move(images[1 + h]);
+  return e;
+}
+
+// The filters of x: a wide one, from 64 passes on its first-order fit, and last a careful one that takes no neighbour's
+// noise for its own.
+std::vector<Estimate> filtersOf(const Estimate& x, const Features* features, const std::atomic<bool>* cancel) {
+  const PatchWelchInput input = patchWelchInput(x, features);
+  std::vector<Estimate> bases;
+  if (input.variance.empty()) return bases;
+  if (x.passes > 0 && x.passes < kFewestPasses) {
+    bases.push_back(asEstimate(std::move(patchWelch(input, std::array{kPatchWelchThreshold}, {}, cancel)[0]), "pw"));
+    return bases;
+  }
+  auto wide = patchWelch(input, std::array{kPatchWelchWideThreshold}, {}, cancel);
+  if (x.passes >= kFirstOrderPasses)
+    bases.push_back(asEstimate(patchWelchFirstOrder(input, wide[0], {}, cancel), "pw1"));
+  bases.push_back(asEstimate(std::move(wide[0]), "pw-wide"));
+  const PatchWelchInput robust = patchWelchInput(x, features, true);
+  auto careful = patchWelch(robust, std::array{kPatchWelchThreshold}, {}, cancel);
+  bases.push_back(asEstimate(std::move(careful[0]), "pw-robust"));
+  return bases;
+}
+
+// The outside base as a filter of x: a denoiser that has seen the unbiased image alone is run again.
+Estimate baseOf(const Estimate& base, const Estimate& x, bool fused, const MethodInputs& in) {
+  if (!fused || !isMethod(base.name)) return base;
+  const std::shared_ptr<const Method> method = findMethod(base.name);
+  if (method->kind() != MethodKind::Denoiser) return base;
+  MethodInputs again = in;
+  again.unbiased = &x;
+  Estimate out = method->run(again).image;
+  out.name = base.name;
+  return hasHalves(out) ? out : base;
+}
+
+// A denoiser may blur its image once more than its halves. Halves moved to the image's side show its errors too.
+Estimate consistentHalves(const Estimate& base) {
+  Estimate out = base;
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t i = 0; i < base.mean.size(); ++i) {
+      const float shift = base.mean[c][i] - 0.5f * (base.half[0][c][i] + base.half[1][c][i]);
+      for (Rgb<float>& half : out.half) half[c][i] += shift;
+    }
+  return out;
+}
+
+// x shrunk towards a base, and each half towards the base's half.
+Estimate shrunkTowards(const Estimate& base, const Estimate& x, const Rgb<float>& variance,
+                       const Rgb<float> (&halfVariances)[2]) {
+  JamesSteinSettings settings;
+  settings.constant = 1;
+  settings.gate = true;
+  Estimate out;
+  out.name = "js@" + base.name;
+  out.mean = jamesStein(x.mean, variance, base.mean, settings).image;
+  for (int h = 0; h < 2; ++h) out.half[h] = jamesStein(x.half[h], halfVariances[h], base.half[h], settings).image;
+  return out;
+}
+
+// Roots of the weights that make errors of pixels relative.
+Plane<float> rootWeights(const Rgb<float>& guide, const Rgb<float>& variance) {
+  const Plane<double> level =
+      boxMean(channelMean(guide, [&](size_t i, size_t c) { return static_cast<double>(guide[c][i]); }), 1);
+  const Plane<float> noise =
+      channelMean(variance, [&](size_t i, size_t c) { return static_cast<double>(variance[c][i]); });
+  Plane<float> out(guide.width(), guide.height());
+  for (size_t i = 0; i < out.size(); ++i)
+    out[i] = finiteFloat(1 / std::sqrt(level[i] * level[i] + 0.01 + kVarianceShare * static_cast<double>(noise[i])));
+  return out;
+}
+
+WeightMaps weightsOf(const std::vector<const Estimate*>& candidates, const Estimate& x, const Rgb<float>& variance,
+                     const MethodInputs& in) {
+  const Plane<float> root = rootWeights(candidates.back()->mean, variance);
+  EnsembleChoices choices;
+  choices.patchRadius = static_cast<int>(std::clamp(in.options.number(kPatch), 1.0, 101.0)) / 2;
+  choices.rootWeights = &root;
+  const WeightMaps raw = ensembleWeights(x, candidates, choices);
+  return filteredWeights(raw, weightedEstimate(raw, candidates), in.features);
+}
+
+Attribute countRemark(const char* name, size_t count) {
+  Attribute a;
+  a.name = name;
+  a.kind = Attribute::Kind::Int;
+  a.integer = static_cast<int64_t>(count);
+  return a;
+}
+
+void removeSpikes(MethodResult& result, const Estimate& x, const Rgb<float>& variance, const Features* features) {
+  const std::vector<Spike> spikes = findSpikes(result.image.mean, x, variance, features);
+  replaceSpikes(result.image.mean, spikes);
+  for (Rgb<float>& half : result.image.half) replaceSpikes(half, spikes);
+  result.remarks.push_back(countRemark("replacedOutliers", spikes.size()));
+}
+
+MethodResult Auto::run(const MethodInputs& in) const {
+  MethodResult result;
+  std::vector<const Estimate*> photonMaps, others;
+  for (const Estimate* b : in.bases)
+    (!b->bias.empty() && in.options.number(kFuse) != 0 ? photonMaps : others).push_back(b);
+  const FusedEstimate fused = fusedEstimate(*in.unbiased, photonMaps, in.features);
+  const Estimate& x = fused.image;
+  std::vector<Estimate> bases;
+  for (const Estimate* b : others) bases.push_back(consistentHalves(baseOf(*b, x, !photonMaps.empty(), in)));
+  for (Estimate& e : filtersOf(x, in.features, in.cancel)) bases.push_back(std::move(e));
+  if (bases.empty() || (x.passes > 0 && x.passes < kFewestPasses)) {  // nothing can be measured across halves
+    result.image = bases.empty() ? x : std::move(bases.back());
+    return result;
+  }
+  const Rgb<float> variance = meanVariance(x);
+  const Rgb<float> halfVariances[2] = {halfVariance(x, variance, 0), halfVariance(x, variance, 1)};
+  std::vector<Estimate> shrunk;
+  if (in.options.number(kShrink) != 0)
+    for (const Estimate& base : bases) shrunk.push_back(shrunkTowards(base, x, variance, halfVariances));
+  std::vector<const Estimate*> candidates;
+  for (const Estimate& e : shrunk) candidates.push_back(&e);
+  for (const Estimate& e : bases) candidates.push_back(&e);
+  const WeightMaps weights = weightsOf(candidates, x, variance, in);
+  result.image = weightedEstimate(weights, candidates);
+  if (in.options.number(kDespike) != 0) removeSpikes(result, x, variance, in.features);
+  result.error = errorMap(result.image.half, x, variance, result.image.mean);
+  for (size_t i = 0; i < fused.squaredBias.size(); ++i) result.error[i] += fused.squaredBias[i];
+  std::vector<Plane<float>> maps = channelMeans(weights);
+  for (size_t b = 0; b < candidates.size(); ++b)
+    result.aovs.push_back({"weight.auto." + layerName(candidates[b]->name), std::move(maps[b])});
+  return result;
+}
+
+}  // namespace
+
+std::unique_ptr<Method> make_auto() { return std::make_unique<Auto>(); }
+
+}  // namespace braid

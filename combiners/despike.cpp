@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combiners/despike.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "combiners/channel_mean.h"
+#include "combiners/mirror.h"
+
+namespace braid {
+
+namespace {
+
+constexpr int kDeviationRadius = 7, kNeighbourRadius = 2;
+constexpr double kDeviationRatio = 8, kSameSurface = 1.5, kQuarterShare = 0.3;
+constexpr double kAlbedoDeviation = 0.25, kNormalDeviation = 0.15;
+
+double brightness(const Rgb<float>& image, size_t i) {
+  return (static_cast<double>(image[0][i]) + static_cast<double>(image[1][i]) + static_cast<double>(image[2][i])) / 3;
+}
+
+double squaredDistance(const Rgb<float>& image, size_t i, size_t j) {
+  double sum = 0;
+  for (size_t c = 0; c < 3; ++c) {
+    const double d = static_cast<double>(image[c][i]) - static_cast<double>(image[c][j]);
+    sum += d * d;
+  }
+  return sum;
+}
+
+// Pixels whose deviation stands out of their surroundings.
+std::vector<char> candidates(const Rgb<float>& variance) {
+  const Plane<float> deviation = channelMean(variance, [&](size_t i, size_t) {
+    double v = 0;
+    for (size_t c = 0; c < 3; ++c) v += static_cast<double>(variance[c][i]) / 3;
+    return std::sqrt(v);
+  });
+  const Plane<double> around = mirrorBoxMean(deviation, kDeviationRadius);
+  std::vector<char> out(deviation.size());
+  for (size_t i = 0; i < out.size(); ++i) out[i] = static_cast<double>(deviation[i]) > kDeviationRatio * around[i];
+  return out;
+}
+
+// The mean of the two darkest quarters.
+double darkHalf(const Estimate& unbiased, size_t i) {
+  std::array<double, 4> values{};
+  for (size_t q = 0; q < 4; ++q) values[q] = brightness(unbiased.quarter[q], i);
+  std::sort(values.begin(), values.end());
+  return 0.5 * (values[0] + values[1]);
+}
+
+struct Neighbours {
+  double weight = 0, brightest = 0;
+  double mean[3] = {0, 0, 0};
+};
+
+Neighbours neighboursOf(const Rgb<float>& image, const std::vector<char>& candidate, const Features* features, int x,
+                        int y) {
+  Neighbours n;
+  const size_t at = image[0].index(x, y);
+  for (int v = std::max(0, y - kNeighbourRadius); v <= std::min(image.height() - 1, y + kNeighbourRadius); ++v)
+    for (int u = std::max(0, x - kNeighbourRadius); u <= std::min(image.width() - 1, x + kNeighbourRadius); ++u) {
+      const size_t other = image[0].index(u, v);
+      if (candidate[other]) continue;
+      double unlike = 0;
+      if (features)
+        unlike = squaredDistance(features->albedo.mean, at, other) / (2 * kAlbedoDeviation * kAlbedoDeviation) +
+                 squaredDistance(features->normal.mean, at, other) / (2 * kNormalDeviation * kNormalDeviation);
+      if (unlike < kSameSurface) n.brightest = std::max(n.brightest, brightness(image, other));
+      const double distance = static_cast<double>((u - x) * (u - x) + (v - y) * (v - y));
+      const double w = std::exp(-unlike - distance / 8);
+      n.weight += w;
+      for (size_t c = 0; c < 3; ++c) n.mean[c] += w * static_cast<double>(image[c][other]);
+    }
+  return n;
+}
+
+}  // namespace
+
+std::vector<Spike> findSpikes(const Rgb<float>& image, const Estimate& unbiased, const Rgb<float>& variance,
+                              const Features* features) {
+  std::vector<Spike> spikes;
+  if (unbiased.quarter.size() != 4) return spikes;
+  const std::vector<char> candidate = candidates(variance);
+  for (int y = 0; y < image.height(); ++y)
+    for (int x = 0; x < image.width(); ++x) {
+      const size_t i = image[0].index(x, y);
+      if (!candidate[i]) continue;
+      const Neighbours n = neighboursOf(image, candidate, features, x, y);
+      const double value = brightness(image, i);
+      if (n.weight < 1e-6 || value <= n.brightest) continue;
+      const double mean = (n.mean[0] + n.mean[1] + n.mean[2]) / (3 * n.weight);
+      if (darkHalf(unbiased, i) - mean >= kQuarterShare * (value - mean)) continue;
+      Spectrum replacement{0};
+      for (size_t c = 0; c < 3; ++c) replacement[static_cast<int>(c)] = finiteFloat(n.mean[c] / n.weight);
+      spikes.push_back({i, replacement});
+    }
+  return spikes;
+}
+
+void replaceSpikes(Rgb<float>& image, const std::vector<Spike>& spikes) {
+  for (const Spike& s : spikes)
+    for (size_t c = 0; c < 3; ++c) image[c][s.index] = s.replacement[static_cast<int>(c)];
+}
+
+}  // namespace braid

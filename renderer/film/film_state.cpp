@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/film/film_state.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "renderer/core/error.h"
+#include "renderer/core/hash.h"
+
+namespace braid {
+
+namespace {
+
+template <class P, class Get>
+FeaturePlanes<P> featurePlanes(const Get& get) {
+  return {get([](const FeatureAccumulator& a, int c) { return a.mean(c); }),
+          {get([](const FeatureAccumulator& a, int c) { return a.halfMean(c, 0); }),
+           get([](const FeatureAccumulator& a, int c) { return a.halfMean(c, 1); })},
+          get([](const FeatureAccumulator& a, int c) { return a.variance(c); })};
+}
+
+Features collectFeatures(const FeatureAccumulator& a) {
+  const auto rgb = [&](int first) {
+    return [&a, first](auto plane) {
+      Rgb<float> planes;
+      for (int c = 0; c < 3; ++c) planes[static_cast<size_t>(c)] = plane(a, first + c);
+      return planes;
+    };
+  };
+  const auto single = [&](int component) { return [&a, component](auto plane) { return plane(a, component); }; };
+  return {featurePlanes<Rgb<float>>(rgb(0)), featurePlanes<Rgb<float>>(rgb(3)), featurePlanes<Plane<float>>(single(6)),
+          featurePlanes<Plane<float>>(single(7))};
+}
+
+Estimate estimateOf(const EstimateState& state, bool quarters) {
+  const Accumulator& a = state.sums;
+  Estimate estimate;
+  estimate.name = state.name;
+  estimate.correlation = state.correlation;
+  estimate.unbiased = state.unbiased;
+  estimate.passes = a.passes();
+  estimate.seconds = state.seconds;
+  estimate.rejected = a.rejected();
+  estimate.mean = a.mean();
+  for (int h = 0; h < 2; ++h) estimate.half[h] = a.halfMean(h);
+  if (quarters && a.bucketCount() == 4)
+    for (int k = 0; k < 4; ++k) estimate.quarter.push_back(a.bucketMean(k));
+  estimate.variance = a.variance(state.lowDiscrepancy);
+  if (a.keepsBias()) {
+    estimate.bias = a.biasMean();
+    estimate.biasVariance = a.biasVariance();
+  }
+  return estimate;
+}
+
+void sayDifference(std::string& text, const std::string& what, const std::string& there, const std::string& here) {
+  if (there == here) return;
+  const auto shown = [](const std::string& value) { return value.empty() ? std::string("not given") : value; };
+  text += fmt::format("{}{} was {} and is {}", text.empty() ? "" : "; ", what, shown(there), shown(here));
+}
+
+std::string valueOf(const std::vector<StateOption>& options, const std::string& name) {
+  for (const StateOption& o : options)
+    if (o.name == name) return o.value;
+  return {};
+}
+
+// Sorts, and joins intervals that touch.
+void normalise(std::vector<PassInterval>& list) {
+  std::sort(list.begin(), list.end(), [](const PassInterval& a, const PassInterval& b) { return a.begin < b.begin; });
+  std::vector<PassInterval> joined;
+  for (const PassInterval& i : list)
+    if (!joined.empty() && joined.back().end == i.begin)
+      joined.back().end = i.end;
+    else
+      joined.push_back(i);
+  list = std::move(joined);
+}
+
+}  // namespace
+
+void EstimateState::addPass(uint64_t pass) {
+  BRAID_ASSERT(passes.empty() || pass >= passes.back().end);
+  if (!passes.empty() && passes.back().end == pass)
+    ++passes.back().end;
+  else
+    passes.push_back({pass, pass + 1});
+}
+
+uint64_t FilmState::rounds() const {
+  if (estimates.empty()) return 0;
+  uint64_t rounds = kMaxPass;
+  for (const EstimateState& e : estimates)
+    rounds = std::min(rounds, e.sums.passes() / static_cast<uint64_t>(e.passesPerRound));
+  return rounds;
+}
+
+uint64_t FilmState::rejected() const {
+  uint64_t count = 0;
+  for (const EstimateState& e : estimates) count += e.sums.rejected();
+  return count;
+}
+
+Estimates estimatesOf(const FilmState& state, bool quarters) {
+  Estimates e;
+  e.width = state.window.width();
+  e.height = state.window.height();
+  e.window = state.window;
+  e.fullWidth = state.fullWidth;
+  e.fullHeight = state.fullHeight;
+  e.seed = state.seed;
+  for (const EstimateState& s : state.estimates) {
+    e.estimates.push_back(estimateOf(s, quarters));
+    if (!s.history.empty()) e.history[s.name] = s.history;
+  }
+  if (state.features) e.features = collectFeatures(*state.features);
+  return e;
+}
+
+std::string difference(const StateIdentity& there, const StateIdentity& here, bool sameBits) {
+  std::string text;
+  sayDifference(text, "the version of braid", there.version, here.version);
+  if (sameBits) {
+    sayDifference(text, "the build", there.build, here.build);
+    sayDifference(text, "--isa", there.isa, here.isa);
+  }
+  sayDifference(text, "the scene's content", hexString(there.sceneHash), hexString(here.sceneHash));
+  for (const StateOption& o : there.options) sayDifference(text, o.name, o.value, valueOf(here.options, o.name));
+  for (const StateOption& o : here.options) {
+    const bool known = std::any_of(there.options.begin(), there.options.end(),
+                                   [&](const StateOption& other) { return other.name == o.name; });
+    if (!known) sayDifference(text, o.name, "", o.value);
+  }
+  return text;
+}
+
+std::string overlap(const FilmState& a, const FilmState& b) {
+  for (const EstimateState& ea : a.estimates)
+    for (const EstimateState& eb : b.estimates) {
+      if (ea.name != eb.name) continue;
+      for (const PassInterval& i : ea.passes)
+        for (const PassInterval& j : eb.passes)
+          if (i.begin < j.end && j.begin < i.end)
+            return fmt::format("both hold the passes {}:{} of {}", std::max(i.begin, j.begin), std::min(i.end, j.end),
+                               ea.name);
+    }
+  return {};
+}
+
+void addShare(FilmState& state, const FilmState& next) {
+  BRAID_ASSERT(state.estimates.size() == next.estimates.size() && state.buckets == next.buckets &&
+               state.window == next.window && state.features.has_value() == next.features.has_value() &&
+               state.coverage.has_value() == next.coverage.has_value());
+  for (size_t i = 0; i < state.estimates.size(); ++i) {
+    EstimateState& e = state.estimates[i];
+    const EstimateState& n = next.estimates[i];
+    BRAID_ASSERT(e.name == n.name);
+    if (!e.history.empty() && e.history.back().passes < e.sums.passes())
+      e.history.push_back({e.sums.passes(), e.seconds, e.sums.variance(e.lowDiscrepancy)});
+    e.sums.add(n.sums);
+    e.seconds += n.seconds;
+    e.passes.insert(e.passes.end(), n.passes.begin(), n.passes.end());
+    normalise(e.passes);
+  }
+  if (state.features) state.features->add(*next.features);
+  if (state.coverage) state.coverage->add(*next.coverage);
+  state.seconds += next.seconds;
+}
+
+}  // namespace braid

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// Everything that a render has gathered: the sums of all passes so far and which passes they are. A render goes on from
+// it, several machines' states add up to one, and estimates are views of it. Sums are kept in double, so that adding
+// those of disjoint passes gives what one run would have given: exactly for sums of floats, to rounding for squares.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "renderer/film/estimates.h"
+
+namespace braid {
+
+// Passes [begin, end) of one integrator.
+struct PassInterval {
+  uint64_t begin = 0, end = 0;
+  uint64_t count() const { return end - begin; }
+  bool operator==(const PassInterval&) const = default;
+};
+
+// Limits of what a state may claim, far beyond any render.
+inline constexpr uint64_t kMaxPass = uint64_t(1) << 48;
+
+struct EstimateState {
+  std::string name;
+  bool unbiased = true;
+  Correlation correlation = Correlation::Independent;
+  bool lowDiscrepancy = false;  // for Accumulator::variance()
+  int passesPerRound = 1;
+  std::vector<PassInterval> passes;  // disjoint, ascending, not touching
+  double seconds = 0;
+  Accumulator sums{0, 0, 2};
+  std::vector<Checkpoint> history;
+
+  uint64_t firstPass() const { return passes.empty() ? 0 : passes.front().begin; }
+  uint64_t endPass() const { return passes.empty() ? 0 : passes.back().end; }
+  // Notes that `pass`, not before endPass(), is among the sums.
+  void addPass(uint64_t pass);
+};
+
+// An option that changes pixels, under its name on the command line.
+struct StateOption {
+  std::string name, value;
+  bool operator==(const StateOption&) const = default;
+};
+
+// What states must share for their passes to be samples of one image.
+struct StateIdentity {
+  std::string version;     // of braid
+  std::string build, isa;  // other bits, the same expectation
+  uint64_t sceneHash = 0;  // over every byte of the scene's files
+  std::vector<StateOption> options;
+};
+
+struct FilmState {
+  StateIdentity identity;
+  uint64_t seed = 0;
+  PixelWindow window;
+  int fullWidth = 0, fullHeight = 0;
+  int buckets = 2;
+  double seconds = 0;  // of the pass loops, summed over machines
+  std::vector<EstimateState> estimates;
+  std::optional<FeatureAccumulator> features;
+  std::optional<CoverageAccumulator> coverage;  // with a transparent background
+  std::vector<Attribute> attributes;            // of image headers, as far as they do not depend on the passes
+
+  // Rounds whose passes are all done.
+  uint64_t rounds() const;
+  uint64_t rejected() const;
+};
+
+// What combiners and writers see. `quarters`: also the four buckets, if there are that many.
+Estimates estimatesOf(const FilmState& state, bool quarters);
+
+// What keeps `there` from being continued or joined by `here`: "--max-depth was 8 and is 32; ..."; empty: nothing.
+// `sameBits`: a difference of build or instruction set counts too.
+std::string difference(const StateIdentity& there, const StateIdentity& here, bool sameBits);
+
+// The first pass interval that both hold, as a sentence, or empty.
+std::string overlap(const FilmState& a, const FilmState& b);
+
+// Adds the passes of a later share to those of an earlier one: identities equal (difference() empty), passes disjoint
+// (overlap() empty), `next` begins behind `state`. Histories do not add up: that of `state` stays, and grows by the
+// point before this addition, if there is a history at all.
+void addShare(FilmState& state, const FilmState& next);
+
+}  // namespace braid

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/session/pixel_options.h"
+
+#include <fmt/format.h>
+
+#include "renderer/core/hash.h"
+#include "renderer/session/integrator.h"
+#include "renderer/session/pixel_filter.h"
+
+namespace braid {
+
+namespace {
+
+const char* yesOrNo(bool yes) { return yes ? "on" : "off"; }
+
+std::string cameraHash(const Camera& camera) {
+  ContentHash hash;
+  for (const Mat4& m : {camera.worldToCamera(), camera.worldToNdc()})
+    for (int i = 0; i < 4; ++i) hash.add(&m[i], sizeof m[i]);
+  return hexString(hash.value());
+}
+
+const char* toString(LightStrategy strategy) {
+  return strategy == LightStrategy::Automatic ? "auto" : strategy == LightStrategy::Power ? "power" : "hierarchy";
+}
+
+}  // namespace
+
+std::vector<StateOption> pixelOptions(const Plan& plan) {
+  const Settings& s = plan.settings;
+  const PixelWindow& w = plan.window;
+  std::string integrators;
+  for (const PlannedIntegrator& p : plan.integrators)
+    integrators += fmt::format("{}{}{}", integrators.empty() ? "" : ",", p.integrator->name(),
+                               p.passesPerRound > 1 ? fmt::format("*{}", p.passesPerRound) : "");
+  return {{"--size", fmt::format("{}x{}", s.width, s.height)},
+          {"--crop", fmt::format("{},{},{},{}", w.x0, w.y0, w.x1, w.y1)},
+          {"the camera", cameraHash(plan.camera)},
+          {"--integrator", integrators},
+          {"--seed", std::to_string(s.seed)},
+          {"--sampler", s.sampler == SamplerKind::Sobol ? "sobol" : "independent"},
+          {"--filter", toString(s.filter)},
+          {"--max-depth", std::to_string(s.maxDepth)},
+          {"--lights", toString(s.lightStrategy)},
+          {"--clamp", fmt::format("{}", s.clamp)},
+          {"--background",
+           s.background ? fmt::format("{},{},{}", s.background->x, s.background->y, s.background->z) : "none"},
+          {"--transparent", yesOrNo(s.transparent)},
+          {"--photons", std::to_string(s.photons)},
+          {"--photon-radius", fmt::format("{}", s.photonRadius)},
+          {"--photon-direct", yesOrNo(s.photonDirect)},
+          {"photon aiming", yesOrNo(s.photonAiming)},
+          {"keeping quarters", yesOrNo(plan.buckets == 4)},
+          {"keeping features", yesOrNo(plan.features)},
+          {"keeping history", yesOrNo(s.history)}};
+}
+
+}  // namespace braid

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// A braid that runs while a test looks at its files and sends it signals.
+#pragma once
+
+#include <chrono>
+#include <csignal>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <spawn.h>
+
+#include "tests/command_line.h"
+
+namespace braid::test {
+
+inline const std::string kCornellFile = BRAID_SOURCE_DIR "/scenes/cornell.glb";
+
+inline bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+// Complete lines only: a killed process may have begun one more.
+inline std::vector<Json> records(const fs::path& path) {
+  std::vector<Json> all;
+  const std::string text = readText(path);
+  for (size_t begin = 0, end; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1)
+    all.push_back(Json::parse(text.substr(begin, end - begin)));
+  return all;
+}
+
+inline std::vector<Json> records(const fs::path& path, const std::string& event) {
+  std::vector<Json> some;
+  for (const Json& r : records(path))
+    if (r["event"] == event) some.push_back(r);
+  return some;
+}
+
+// `braid render` of the Cornell box; output goes to the test's own.
+class Process {
+ public:
+  explicit Process(std::vector<std::string> words) : words_(std::move(words)) {
+    words_.insert(words_.begin(), {BRAID_BINARY, "render", kCornellFile, "-q"});
+    std::vector<char*> arguments;
+    for (std::string& w : words_) arguments.push_back(w.data());
+    arguments.push_back(nullptr);
+    REQUIRE(posix_spawn(&child_, BRAID_BINARY, nullptr, nullptr, arguments.data(), environ) == 0);
+  }
+  ~Process() {
+    if (child_ == 0) return;
+    ::kill(child_, SIGKILL);
+    waitpid(child_, nullptr, 0);
+  }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  void signal(int number) const { REQUIRE(::kill(child_, number) == 0); }
+  // The exit code, or minus the signal that ended it.
+  int wait() {
+    int status = 0;
+    REQUIRE(waitpid(child_, &status, 0) == child_);
+    child_ = 0;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
+
+ private:
+  std::vector<std::string> words_;
+  pid_t child_ = 0;
+};
+
+inline void sleepFor(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
+
+template <class Done>
+bool waitUntil(const Done& done) {
+  for (int i = 0; i < 15000; ++i) {
+    if (done()) return true;
+    sleepFor(0.002);
+  }
+  return false;
+}
+
+}  // namespace braid::test

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+// The combiner "auto" and its parts: fused estimates, the removal of outliers, relative error maps.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <doctest/doctest.h>
+
+#include "combiners/despike.h"
+#include "combiners/error_map.h"
+#include "combiners/fused_estimate.h"
+#include "combiners/pipeline.h"
+#include "tests/combiner_fixture.h"
+
+using namespace braid;
+using namespace braid::test;
+
+namespace {
+
+// The estimates of the names and the features.
+Estimates kept(const Case& c, const std::vector<std::string>& names) {
+  Estimates e = c.estimates;
+  std::erase_if(e.estimates, [&](const Estimate& x) { return !std::count(names.begin(), names.end(), x.name); });
+  return e;
+}
+
+PipelineOutput outputOf(const Estimates& e, const std::string& method, const PipelineOptions& options = {}) {
+  const PipelineResult result = runPipeline(e, {method}, options);
+  const PipelineOutput* out = result.find(method);
+  REQUIRE(out);
+  INFO(out->step.obstacle);
+  REQUIRE(out->ran());
+  return *out;
+}
+
+Case noisyCase(uint64_t samples, double fireflies = 0, uint64_t seed = 1) {
+  CaseOptions o;
+  o.width = 96;
+  o.height = 72;
+  o.samples = samples;
+  o.fireflies = fireflies;
+  o.seed = seed;
+  return makeCase(o);
+}
+
+double relativeError(const Rgb<float>& image, const Rgb<float>& truth) {
+  double sum = 0;
+  for (size_t i = 0; i < image.size(); ++i) {
+    double level = 0, square = 0;
+    for (size_t c = 0; c < 3; ++c) {
+      level += static_cast<double>(truth[c][i]) / 3;
+      square += sqr(static_cast<double>(image[c][i]) - static_cast<double>(truth[c][i])) / 3;
+    }
+    sum += square / (level * level + 0.01);
+  }
+  return sum / static_cast<double>(image.size());
+}
+
+double relativeSum(const Plane<float>& error, const Rgb<float>& truth) {
+  double sum = 0;
+  for (size_t i = 0; i < error.size(); ++i) {
+    double level = 0;
+    for (size_t c = 0; c < 3; ++c) level += static_cast<double>(truth[c][i]) / 3;
+    sum += static_cast<double>(error[i]) / (level * level + 0.01);
+  }
+  return sum / static_cast<double>(error.size());
+}
+
+// A grey image whose quarters and halves agree, with the given variance.
+Estimate flat(float value, float variance, int width = 40, int height = 30) {
+  Estimate e;
+  e.passes = 64;
+  e.mean = e.half[0] = e.half[1] = Rgb<float>(width, height, value);
+  e.quarter.assign(4, e.mean);
+  e.variance = Rgb<float>(width, height, variance);
+  return e;
+}
+
+void setPixel(Estimate& e, size_t i, float value, const std::array<float, 4>& quarters, float variance) {
+  for (size_t c = 0; c < 3; ++c) {
+    e.mean[c][i] = value;
+    for (size_t q = 0; q < 4; ++q) e.quarter[q][c][i] = quarters[q];
+    e.half[0][c][i] = 0.5f * (quarters[0] + quarters[2]);
+    e.half[1][c][i] = 0.5f * (quarters[1] + quarters[3]);
+    e.variance[c][i] = variance;
+  }
+}
+
+}  // namespace
+
+TEST_CASE("auto is far better than the unbiased image and hardly ever worse than its filters") {
+  int worse = 0, cells = 0;
+  for (const uint64_t samples : {8, 32, 128})
+    for (const double fireflies : {0.0, 0.001}) {
+      const Case c = noisyCase(samples, fireflies);
+      const Estimates e = kept(c, {"pt"});
+      const double best = relativeError(outputOf(e, "auto").result.image.mean, c.truth);
+      double input = relativeError(c.pt().mean, c.truth);
+      CAPTURE(samples);
+      CAPTURE(fireflies);
+      CHECK(best < 0.25 * input);
+      for (const char* filter : {"pw-wide", "pw1"})
+        input = std::min(input, relativeError(outputOf(e, filter).result.image.mean, c.truth));
+      ++cells;
+      worse += best > 1.05 * input;
+      CHECK(best < 1.25 * input);
+    }
+  CHECK(cells == 6);
+  CHECK(worse <= 1);
+}
+
+TEST_CASE("auto's error map agrees with the true error of the image within a factor of two") {
+  for (const uint64_t samples : {16, 64, 256}) {
+    const Case c = noisyCase(samples, 0, samples);
+    for (const std::vector<std::string>& names : {std::vector<std::string>{"pt"}, {"pt", "sppm"}}) {
+      const PipelineOutput out = outputOf(kept(c, names), "auto");
+      const double ratio = relativeSum(out.result.error, c.truth) / relativeError(out.result.image.mean, c.truth);
+      CAPTURE(samples);
+      CAPTURE(names.size());
+      CHECK(ratio > 0.5);
+      CHECK(ratio < 2.0);
+    }
+  }
+}
+
+TEST_CASE("With a photon map auto is better than with either image alone") {
+  CaseOptions o;
+  o.noise = 8;
+  o.photonBlur = 1;
+  const Case c = makeCase(o);
+  const double both = relativeError(outputOf(kept(c, {"pt", "sppm"}), "auto").result.image.mean, c.truth);
+  CHECK(both < 0.9 * relativeError(outputOf(kept(c, {"pt"}), "auto").result.image.mean, c.truth));
+  CHECK(both < 0.9 * relativeError(c.sppm().mean, c.truth));
+  CHECK(both < 0.1 * relativeError(c.pt().mean, c.truth));
+}
+
+TEST_CASE("A denoiser whose image is worse than its halves show is not believed") {
+  const Case c = noisyCase(64);
+  Estimates e = kept(c, {"pt"});
+  Estimate liar;  // halves next to the truth, an image that is black
+  liar.name = "liar";
+  liar.unbiased = false;
+  liar.half[0] = liar.half[1] = c.truth;
+  liar.mean = Rgb<float>(e.width, e.height);
+  const double without = relativeError(outputOf(e, "auto").result.image.mean, c.truth);
+  e.estimates.push_back(liar);
+  CHECK(relativeError(outputOf(e, "auto").result.image.mean, c.truth) < 1.1 * without);
+}
+
+TEST_CASE("auto with two passes is the filter's image, with one it says what it needs") {
+  const Estimates two = kept(noisyCase(2), {"pt"});
+  PipelineOptions options;
+  CHECK(identical(outputOf(two, "auto").result.image.mean, outputOf(two, "pw").result.image.mean));
+  const PipelineResult one = runPipeline(kept(noisyCase(1), {"pt"}), {"auto"}, options);
+  CHECK(one.find("auto")->step.obstacle.find("needs 2 passes") != std::string::npos);
+}
+
+TEST_CASE("Without photon maps the fused estimate is the unbiased one") {
+  const Case c = noisyCase(16);
+  const FusedEstimate f = fusedEstimate(c.pt(), {}, nullptr);
+  CHECK(identical(f.image.mean, c.pt().mean));
+  CHECK(identical(f.image.variance, c.pt().variance));
+  CHECK(f.squaredBias.empty());
+}
+
+TEST_CASE("Fused weights are inverse errors, and the bias that is left is counted") {
+  Estimate x = flat(1.0f, 0.03f), s = flat(1.0f, 0.005f);
+  s.name = "sppm";
+  s.unbiased = false;
+  s.mean = s.half[0] = s.half[1] = Rgb<float>(40, 30, 0.9f);
+  s.quarter.assign(4, s.mean);
+  s.bias = Rgb<float>(40, 30, std::sqrt(0.005f));
+  s.biasVariance = Rgb<float>(40, 30);
+  const FusedEstimate f = fusedEstimate(x, {&s}, nullptr);
+  // Errors 0.03 and 0.01: weights 1/4 and 3/4.
+  CHECK(f.image.mean[0][500] == doctest::Approx(0.25 * 1.0 + 0.75 * 0.9).epsilon(1e-3));
+  CHECK(f.image.quarter[2][1][500] == doctest::Approx(0.925).epsilon(1e-3));
+  CHECK(f.image.variance[0][500] == doctest::Approx(0.0625 * 0.03 + 0.5625 * 0.01).epsilon(1e-3));
+  CHECK(f.squaredBias[500] == doctest::Approx(0.5625 * 0.005).epsilon(1e-3));
+}
+
+TEST_CASE("Where the unbiased image has not found the light, the photon map is believed") {
+  // No sample has hit the caustic in the left half: half the light, and a variance that knows nothing of the rest.
+  Estimate x = flat(1.0f, 1e-6f), s = flat(1.0f, 1e-3f);
+  s.unbiased = false;
+  s.bias = s.biasVariance = Rgb<float>(40, 30);
+  for (int y = 0; y < 30; ++y)
+    for (int u = 0; u < 20; ++u)
+      for (size_t c = 0; c < 3; ++c) x.mean[c].at(u, y) = 0.5f;
+  const FusedEstimate f = fusedEstimate(x, {&s}, nullptr);
+  CHECK(f.image.mean[0].at(5, 15) > 0.99f);
+  // Too bright, on the other hand, is no sign of missing light: the small variance is believed.
+  for (size_t c = 0; c < 3; ++c)
+    for (float& v : x.mean[c].data) v = 1.5f;
+  CHECK(fusedEstimate(x, {&s}, nullptr).image.mean[0].at(5, 15) > 1.49f);
+}
+
+TEST_CASE("An outlier in one quarter is replaced, a lamp in all of them stays") {
+  Estimate x = flat(1.0f, 1e-4f);
+  const size_t outlier = x.mean[0].index(10, 10), lamp = x.mean[0].index(30, 20);
+  setPixel(x, outlier, 50, {197, 1, 1, 1}, 2400);
+  setPixel(x, lamp, 50, {49, 51, 50, 50}, 2400);
+  const std::vector<Spike> spikes = findSpikes(x.mean, x, x.variance, nullptr);
+  REQUIRE(spikes.size() == 1);
+  CHECK(spikes[0].index == outlier);
+  for (int c = 0; c < 3; ++c) CHECK(spikes[0].replacement[c] == doctest::Approx(1.0));
+  Rgb<float> image = x.mean;
+  replaceSpikes(image, spikes);
+  CHECK(image[1][outlier] == doctest::Approx(1.0));
+  CHECK(image[1][lamp] == 50.0f);
+  x.quarter.clear();
+  CHECK(findSpikes(x.mean, x, x.variance, nullptr).empty());
+}
+
+TEST_CASE("A noisy lamp lends the dark pixels around it no error that they cannot have") {
+  Estimate x = flat(0.01f, 1e-8f);
+  const size_t lamp = x.mean[0].index(20, 15);
+  setPixel(x, lamp, 100, {90, 110, 95, 105}, 16);
+  const Plane<float> error = errorMap(x.half, x, x.variance, x.mean);
+  const double beside = static_cast<double>(error[lamp + 3]);
+  CHECK(static_cast<double>(error[lamp]) > 0.1);
+  CHECK(beside / 0.01 < 0.02);  // relative; the lamp's own relative error is 0.0056
+}

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+// Publication while a render goes on: when it happens, that it changes no pixel, and what ends a run.
+#include <doctest/doctest.h>
+
+#include "tests/running_braid.h"
+#include "tools/image_output.h"
+#include "tools/publication_schedule.h"
+
+using namespace braid;
+using test::braidRun;
+using test::contains;
+using test::Folder;
+using test::Json;
+using test::kCornellFile;
+using test::readText;
+using test::records;
+using test::Run;
+
+namespace {
+
+Progress at(uint64_t round, double seconds, double left = -1) {
+  Progress p;
+  p.round = round;
+  p.seconds = seconds;
+  p.secondsLeft = left;
+  return p;
+}
+
+}  // namespace
+
+TEST_CASE("Images are due after rounds 1, 2, 4, 8, and by the clock") {
+  PublicationSchedule s(10, 0, false);
+  std::vector<uint64_t> marks;
+  for (uint64_t round = 1; round <= 40; ++round) {
+    const Progress p = at(round, static_cast<double>(round) * 0.1);
+    const auto due = s.due(p);
+    CHECK(due.image == due.state);
+    CHECK(!due.combined);
+    s.begun(due, p);
+    if (due.image) s.published(round, false, 1e-5, std::nullopt);
+    if (due.image) marks.push_back(round);
+  }
+  CHECK(marks == std::vector<uint64_t>{1, 2, 4, 8, 16, 32});
+  CHECK(!s.due(at(41, 13.1)).image);
+  CHECK(s.due(at(41, 13.3)).image);  // ten seconds after round 32
+  CHECK(!PublicationSchedule(0, 0, false).due(at(41, 1e6)).image);
+  // Nothing for runs that are about to end.
+  CHECK(!PublicationSchedule(10, 0, false).due(at(1, 0.1, 0.5)).image);
+  CHECK(PublicationSchedule(10, 0, false).due(at(1, 0.1, 5)).image);
+  Progress last = at(64, 50, 0);
+  last.rounds = 64;
+  CHECK(!PublicationSchedule(10, 0, false).due(last).state);
+}
+
+TEST_CASE("Publishing takes its share of the time and no more") {
+  // Every image costs one second of the machine; a round takes 0.2 s; the clock is off.
+  for (const bool combines : {false, true}) {
+    PublicationSchedule s(0, 0, combines);
+    uint64_t round = 0;
+    double seconds = 0, spent = 0;
+    int images = 0, combined = 0;
+    while (seconds < 5000) {
+      seconds += 0.2;
+      const Progress p = at(++round, seconds);
+      const auto due = s.due(p);
+      if (!due.image) continue;
+      s.begun(due, p);
+      s.published(round, due.combined, 1, std::nullopt);
+      spent += 1;
+      ++images;
+      combined += due.combined;
+      // What the first one of a kind costs is not known before.
+      if (images > 2) CHECK(spent - (combines ? 1 : 0) <= PublicationSchedule::kShare * seconds);
+    }
+    CHECK(images >= 8);
+    CHECK(combined == (combines ? images - 1 : 0));
+  }
+}
+
+TEST_CASE("The first image is plain, combined ones follow, and one that takes too long is given up") {
+  PublicationSchedule s(5, 0, true);
+  const auto first = s.due(at(1, 1, 999));
+  CHECK(first.image);
+  CHECK(!first.combined);
+  s.begun(first, at(1, 1, 999));
+  s.published(1, false, 0.01, std::nullopt);
+  const auto second = s.due(at(2, 2, 998));
+  CHECK(second.combined);
+  s.begun(second, at(2, 2, 998));
+  CHECK(!s.tooLong(at(3, 20, 980), 39));  // 4 % of 1000 s
+  CHECK(s.tooLong(at(3, 20, 980), 41));
+  s.givenUp(30);
+  CHECK(!s.due(at(4, 60, 940)).combined);
+  CHECK(s.due(at(4, 60, 940)).image);  // plain, by the clock
+  // Once a combined image is out, no plain one takes its place.
+  PublicationSchedule t(5, 0, true);
+  t.begun({true, true, false}, at(1, 1));
+  t.published(1, false, 0.01, std::nullopt);
+  t.begun({true, true, true}, at(2, 100));
+  t.published(2, true, 3.9, std::nullopt);
+  CHECK(!t.due(at(4, 110)).image);
+  CHECK(t.due(at(4, 110)).state);
+  CHECK(t.due(at(4, 200)).combined);
+  // Saving by the clock, however dear, does not keep combiners from their share.
+  PublicationSchedule u(1, 0, true);
+  u.begun({true, true, false}, at(1, 1));
+  u.published(1, false, 50, std::nullopt);
+  u.spend(100);
+  CHECK(u.due(at(3, 10)).combined);
+}
+
+TEST_CASE("A target of the error is looked at where it should be met, not before 16 samples") {
+  PublicationSchedule s(0, 0.01, false);
+  s.begun({true, true, false}, at(8, 1));
+  s.published(8, false, 0, 0.0);
+  CHECK(!s.reached());
+  s.begun({true, true, false}, at(32, 4));
+  s.published(32, false, 0, 0.015);
+  CHECK(!s.reached());
+  CHECK(!s.due(at(48, 6)).image);
+  CHECK(s.due(at(49, 6)).image);  // 32 * 1.5 * 1.02
+  s.begun({true, true, false}, at(49, 6));
+  s.published(49, false, 0, 0.0099);
+  CHECK(s.reached());
+}
+
+TEST_CASE("The relative error is the mean of squared errors over squared values, whatever is broken left out") {
+  Plane<float> error(2, 2, 0.02f);
+  Rgb<float> image(2, 2, 0.1f);
+  CHECK(relativeError(error, image) == doctest::Approx(1.0));
+  error[3] = std::numeric_limits<float>::quiet_NaN();
+  image[0][2] = image[1][2] = image[2][2] = 0;
+  CHECK(relativeError(error, image) == doctest::Approx((1 + 1 + 2) / 3.0));
+  CHECK(relativeError({}, {}) == 0);
+}
+
+TEST_CASE("Publishing changes no pixel, with and without combiners") {
+  const Folder folder;
+  for (const std::string& combine : {std::string(), std::string(" --combine js --biased box")}) {
+    INFO(combine);
+    const std::string common = "render '" + kCornellFile + "' -q --size 80x48 --spp 400 --reproducible" + combine;
+    CHECK(
+        braidRun(
+            folder,
+            common + " -o often.exr --png often.png --checkpoint o.state --save-every 0.05 --threads 1 --log-json log")
+            .code == 0);
+    CHECK(braidRun(folder, common + " -o never.exr --save-every 0 --threads 2").code == 0);
+    CHECK((readText(folder.path / "often.exr") == readText(folder.path / "never.exr")));
+    const std::vector<Json> published = records(folder.path / "log", "published");
+    MESSAGE(published.size() << " publications");
+    CHECK(published.size() >= 2);
+    for (const Json& p : published) CHECK(p["spp"].get<int>() < 400);
+    // The first one is plain.
+    CHECK(published[0].contains("combined") == !combine.empty());
+    if (!combine.empty()) CHECK(published[0]["combined"] == false);
+    CHECK(records(folder.path / "log", "warning").empty());
+  }
+}
+
+TEST_CASE("The first of samples, time and error ends the run, and the record says which") {
+  const Folder folder;
+  const std::string common = "render '" + kCornellFile + "' --size 32x24 -o o.exr --log-json log ";
+  const auto end = [&] { return records(folder.path / "log").back(); };
+  Run run = braidRun(folder, common + "--error 0.01 --spp 100000 --time 60 --png o.png --checkpoint o.state");
+  CHECK(run.code == 0);
+  CHECK(end()["reason"] == "error");
+  CHECK(end()["estimatedError"].get<double>() < 0.011);
+  CHECK(end()["spp"].get<int>() >= 16);
+  CHECK(end()["outputs"] == Json::array({"o.exr", "o.png", "o.state"}));
+  const std::string last = run.err.substr(run.err.rfind('\n', run.err.size() - 2) + 1);
+  CHECK(contains(last, " spp in "));
+  CHECK(contains(last, "estimated error 0.0"));
+  CHECK(contains(last, "stopped by error: o.exr, o.png, o.state"));
+  run = braidRun(folder, common + "--error 0.0000001 --spp 20");
+  CHECK(run.code == 6);
+  CHECK(end()["reason"] == "samples");
+  CHECK(contains(run.err, "--error 1e-07 was not reached: the estimated error is 0.0"));
+  run = braidRun(folder, common + "--error 0.0000001 --time 0.3");
+  CHECK(run.code == 6);
+  CHECK(end()["reason"] == "time");
+  CHECK(braidRun(folder, common + "--error 0").code == 1);
+  run = braidRun(folder, "render '" + kCornellFile + "' --checkpoint o.state --error 0.1");
+  CHECK(run.code == 1);
+  CHECK(contains(run.err, "no image to estimate it from"));
+}

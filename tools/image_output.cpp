@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/image_output.h"
+
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+#include <tbb/task_arena.h>
+
+#include "renderer/core/parallel.h"
+#include "renderer/film/error_map.h"
+#include "tools/output_options.h"
+#include "tools/progress_line.h"
+
+namespace braid {
+
+namespace {
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// The last wanted method that ran; null: none.
+const MethodResult* headlineOf(const PipelineResult& combined, const std::vector<std::string>& wanted) {
+  for (size_t i = wanted.size(); i > 0; --i)
+    if (const PipelineOutput* out = combined.find(wanted[i - 1]); out && out->ran()) return &out->result;
+  return nullptr;
+}
+
+bool knowsError(const Estimate& e) { return e.passes >= 2 && !e.variance.empty(); }
+
+// The error of the last wanted method that ran, or of the first integrator.
+std::optional<double> headlineError(const PipelineResult& combined, const std::vector<std::string>& wanted,
+                                    const Estimates& estimates) {
+  if (const MethodResult* result = headlineOf(combined, wanted)) {
+    if (result->error.empty()) return std::nullopt;
+    return relativeError(result->error, result->image.mean);
+  }
+  const Estimate& first = estimates.estimates.front();
+  if (!knowsError(first)) return std::nullopt;
+  return relativeError(errorMap(first), first.mean);
+}
+
+}  // namespace
+
+std::vector<std::string> ImageOutput::files() const {
+  std::vector<std::string> list;
+  for (const std::string& name : {exr, png})
+    if (!name.empty()) list.push_back(name);
+  return list;
+}
+
+void addImageOptions(CLI::App& command, ImageOutput& o) {
+  command
+      .add_option("--combine", o.combine.combine,
+                  "none, or denoisers and combiners separated by commas (--list); the last one is the image R G B")
+      ->capture_default_str();
+  addCombineOptions(command, o.combine);
+  command.add_option("-o,--output", o.exr, "EXR file to write");
+  command.add_option("--png", o.png, "Also write a tone-mapped PNG");
+  command.add_option("--exposure", o.exposure, "Exposure of the PNG in stops")->capture_default_str();
+  command.add_option("--aovs", o.aovs, "Layers besides the image: none, features or all")->capture_default_str();
+  command.add_flag("--quarters", o.quarters, "Also write the four quarter buffers");
+  command.add_flag("--history", o.history, "Also write the variances after 1, 2, 4, ... samples, for combining later");
+  command.add_flag("--float", o.floatHeadline, "R G B as 32-bit floats");
+  command.add_option("--layer-prefix", o.layerPrefix, "Put before every layer's name, e.g. ViewLayer");
+  command.add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
+}
+
+double relativeError(const Plane<float>& error, const Rgb<float>& image) {
+  struct Sum {
+    double total = 0;
+    uint64_t count = 0;
+    Sum& operator+=(const Sum& other) {
+      total += other.total;
+      count += other.count;
+      return *this;
+    }
+  };
+  const Sum sum = parallelSum(error.size(), 4096, Sum{}, [&](size_t begin, size_t end) {
+    Sum s;
+    for (size_t i = begin; i < end; ++i) {
+      const double mean =
+          (static_cast<double>(image[0][i]) + static_cast<double>(image[1][i]) + static_cast<double>(image[2][i])) / 3;
+      const double value = static_cast<double>(error[i]) / (mean * mean + 0.01);
+      if (!std::isfinite(value)) continue;
+      s.total += value;
+      ++s.count;
+    }
+    return s;
+  });
+  return sum.count > 0 ? sum.total / static_cast<double>(sum.count) : 0.0;
+}
+
+void showImages(const Estimates& estimates, const PipelineResult& combined, const std::vector<std::string>& wanted,
+                const ShowImages& show) {
+  const Estimate& first = estimates.estimates.front();
+  ImageViews views{&first.mean};
+  Plane<float> noisyError;
+  if (knowsError(first)) {
+    noisyError = errorMap(first);
+    views.noisyError = &noisyError;
+  }
+  if (const MethodResult* result = headlineOf(combined, wanted)) {
+    views.combined = &result->image.mean;
+    if (!result->error.empty()) views.combinedError = &result->error;
+  }
+  show(views);
+}
+
+WrittenImage writeImage(const ImageOutput& o, Estimates estimates, const Plane<float>* alpha, int threads,
+                        const std::atomic<bool>* cancel) {
+  WrittenImage written;
+  const std::vector<std::string> wanted = o.combine.wanted();
+  const auto combineStart = std::chrono::steady_clock::now();
+  const PipelineResult combined = runCombining(estimates, o.combine, o.combine.options(cancel), threads);
+  written.combineSeconds = secondsSince(combineStart);
+  if (cancel && cancel->load()) {
+    written.cancelled = true;
+    return written;
+  }
+  tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
+  arena.execute([&] {
+    if (o.show) showImages(estimates, combined, wanted, o.show);
+    const auto writeStart = std::chrono::steady_clock::now();
+    written.error = headlineError(combined, wanted, estimates);
+    const Rgb<float> first = estimates.estimates.front().mean;
+    const CombinedLayers layers(combined, wanted, o.combine.weights, !o.noTiming, estimates);
+    const Rgb<float>& headline = layers.headline() ? *layers.headline() : first;
+    ExrOptions exr;
+    exr.layers = layers.layers();
+    exr.history = o.history;
+    exr.aovs = parseAovs(o.aovs);
+    exr.quarters = o.quarters;
+    exr.floatHeadline = o.floatHeadline;
+    exr.layerPrefix = o.layerPrefix;
+    written.warnings = combineWarnings(combined);
+    if (!o.exr.empty()) {
+      const WriteReport report = writeExr(o.exr, estimates, headline, alpha, exr);
+      if (report.clampedToHalf > 0)
+        written.warnings.push_back(
+            fmt::format("{}: {} headline values above 65504 were clamped to fit half floats: use --float", o.exr,
+                        report.clampedToHalf));
+    }
+    if (!o.png.empty()) writePng(o.png, headline, static_cast<float>(o.exposure));
+    written.writeSeconds = secondsSince(writeStart);
+  });
+  for (const PipelineOutput& out : combined.outputs)
+    if (out.ran())
+      written.timings.push_back(fmt::format("{} in {}, its inputs in {}", out.step.name, formatSeconds(out.seconds),
+                                            formatSeconds(out.inputSeconds)));
+  return written;
+}
+
+}  // namespace braid

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// From estimates to files: denoisers and combiners, then the EXR and the PNG. During a render, at its end, and after
+// merging.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "renderer/film/exr.h"
+#include "tools/combining.h"
+
+namespace braid {
+
+// What viewers are shown of one publication. Errors are estimated squared errors, averaged over the channels. What is
+// null does not exist or is not known; nothing outlives the call that it is handed to.
+struct ImageViews {
+  const Rgb<float>* noisy = nullptr;     // of the first integrator
+  const Rgb<float>* combined = nullptr;  // the image of the last wanted method that ran
+  const Plane<float>*noisyError = nullptr, *combinedError = nullptr;
+};
+using ShowImages = std::function<void(const ImageViews&)>;
+
+struct ImageOutput {
+  std::string exr, png;  // empty: not written
+  std::string aovs = "all", layerPrefix;
+  double exposure = 0;
+  bool quarters = false, history = false, floatHeadline = false, noTiming = false;
+  CombineChoice combine;
+  ShowImages show;  // called between combining and writing, if there is one
+
+  // The names of the files, without empty ones.
+  std::vector<std::string> files() const;
+};
+
+// -o, --png, --combine and all that say what the files hold.
+void addImageOptions(CLI::App& command, ImageOutput& output);
+
+// What became of one writing.
+struct WrittenImage {
+  // Estimated squared error of the headline over its squared value + 0.01, averaged over the image (relL2 of
+  // `braid compare`); none where the headline's method does not estimate its error.
+  std::optional<double> error;
+  double combineSeconds = 0, writeSeconds = 0;
+  std::vector<std::string> warnings, timings;  // one line each
+  bool cancelled = false;                      // nothing was written
+};
+
+// Runs the methods and writes the files. `attributes` of the estimates are those of the header. `threads` 0: all that
+// the process may use. When `cancel` is set meanwhile, the files stay as they were. Throws Error(OutputFailed).
+WrittenImage writeImage(const ImageOutput& output, Estimates estimates, const Plane<float>* alpha, int threads,
+                        const std::atomic<bool>* cancel = nullptr);
+
+// Calls `show` with what the estimates and the methods that ran on them hold.
+void showImages(const Estimates& estimates, const PipelineResult& combined, const std::vector<std::string>& wanted,
+                const ShowImages& show);
+
+// Mean of `error` / (mean over channels of `image`² + 0.01); pixels that are not finite are left out.
+double relativeError(const Plane<float>& error, const Rgb<float>& image);
+
+}  // namespace braid

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/publication_schedule.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace braid {
+
+// Of a run with a limit all of it, otherwise of what there was so far.
+double PublicationSchedule::shareOfRun(const Progress& p, double least) const {
+  const double run = p.secondsLeft >= 0 ? p.seconds + p.secondsLeft : std::max(least, p.seconds);
+  return kShare * run;
+}
+
+PublicationSchedule::Due PublicationSchedule::due(const Progress& p) const {
+  Due due;
+  if ((p.rounds > 0 && p.round >= p.rounds) || (p.secondsLeft >= 0 && p.secondsLeft < kSoon)) return due;
+  const auto since = [&](double last) { return saveEvery_ > 0 && p.seconds - last >= saveEvery_; };
+  const bool mark = std::has_single_bit(p.round) || (checkSamples_ > 0 && p.round >= checkSamples_);
+  const bool plainPays = !any_ || plainSpent_ + plainCost_ <= kShare * p.seconds;
+  const bool combinedPays =
+      combines_ && any_ && combinedSpent_ <= kShare * p.seconds && combinedSpent_ + combinedCost_ <= shareOfRun(p, 0);
+  due.state = (mark && plainPays) || since(lastState_);
+  due.combined = (mark || since(lastImage_)) && combinedPays;
+  due.image = due.combined || (!combinedOut_ && ((mark && plainPays) || since(lastImage_)));
+  return due;
+}
+
+void PublicationSchedule::begun(const Due& what, const Progress& p) {
+  if (what.state) lastState_ = p.seconds;
+  if (!what.image) return;
+  lastImage_ = p.seconds;
+  any_ = true;
+  checkSamples_ = 0;
+}
+
+// The squared error of a mean falls as one over the number of samples.
+void PublicationSchedule::published(uint64_t samples, bool combined, double cost, std::optional<double> error) {
+  (combined ? combinedSpent_ : plainSpent_) += cost;
+  (combined ? combinedCost_ : plainCost_) = cost;
+  combinedOut_ = combinedOut_ || combined;
+  if (targetError_ <= 0 || !error || samples < kLeastSamples) return;
+  reached_ = reached_ || *error <= targetError_;
+  const double needed = std::ceil(static_cast<double>(samples) * std::min(2.0, 1.02 * *error / targetError_));
+  checkSamples_ = std::max(samples + 1, static_cast<uint64_t>(needed));
+}
+
+bool PublicationSchedule::tooLong(const Progress& p, double cost) const {
+  return combinedSpent_ + cost > shareOfRun(p, kLeastRun);
+}
+
+// It would have taken longer: by how much nobody knows.
+void PublicationSchedule::givenUp(double cost) {
+  combinedSpent_ += cost;
+  combinedCost_ = 2 * cost;
+}
+
+}  // namespace braid

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// When a running render shows what it has: after the rounds 1, 2, 4, 8, …, every so many seconds, and where the error
+// is expected to meet its target; but never so often that showing takes more than its share of the time.
+//
+// With combiners the first image out is the plain one, because nobody knows yet what combining costs. Combined ones
+// replace it as soon as they are affordable, and one that turns out to be too long is given up.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "renderer/session/session.h"
+
+namespace braid {
+
+class PublicationSchedule {
+ public:
+  // Of the time of a run, what combining may take, and as much what plain images and states after rounds 1, 2, 4, …
+  // may take; what the clock asks for and the final images apart.
+  static constexpr double kShare = 0.04;
+  // A run that ends so soon, in seconds, has its final images soon.
+  static constexpr double kSoon = 1;
+  // Runs without a limit count as at least so long when a combiner may take its share, in seconds.
+  static constexpr double kLeastRun = 50;
+  // Before so many samples a pixel an error estimate does not end a render: what is rare may not have been met yet.
+  static constexpr uint64_t kLeastSamples = 16;
+
+  // `saveEvery` in seconds, 0: never by the clock; `targetError` 0: none; `combines`: whether combiners run.
+  PublicationSchedule(double saveEvery, double targetError, bool combines)
+      : saveEvery_(saveEvery), targetError_(targetError), combines_(combines) {}
+
+  struct Due {
+    bool state = false, image = false;
+    bool combined = false;  // the image goes through the combiners
+  };
+  // What to do after this round.
+  Due due(const Progress& progress) const;
+
+  // What was begun of it. Costs are in seconds of the whole machine.
+  void begun(const Due& what, const Progress& progress);
+  void spend(double cost) { plainSpent_ += cost; }
+  // An image is out: its samples, what it cost, and its estimated error where that is known and meant by the target.
+  void published(uint64_t samples, bool combined, double cost, std::optional<double> error);
+  // Whether the combined image at work, with this cost so far, has to be given up.
+  bool tooLong(const Progress& progress, double cost) const;
+  void givenUp(double cost);
+
+  // Whether a published error met the target.
+  bool reached() const { return reached_; }
+
+ private:
+  double shareOfRun(const Progress& progress, double least) const;
+
+  double saveEvery_, targetError_;
+  bool combines_;
+  double lastImage_ = 0, lastState_ = 0;  // when
+  // Apart, so that frequent saving does not keep combiners from their share.
+  double plainSpent_ = 0, combinedSpent_ = 0;
+  double plainCost_ = 0, combinedCost_ = 0;  // of one
+  bool any_ = false, combinedOut_ = false, reached_ = false;
+  uint64_t checkSamples_ = 0;  // when the error is worth a look; 0: not before the next power of two
+};
+
+}  // namespace braid

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/publisher.h"
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <utility>
+
+#include <tbb/info.h>
+
+#include "renderer/core/error.h"
+#include "renderer/film/state_file.h"
+#include "tools/header.h"
+
+namespace braid {
+
+namespace {
+
+class Clock {
+ public:
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+uint64_t samplesOf(const FilmState& state) { return state.estimates.front().sums.passes(); }
+
+}  // namespace
+
+void BackgroundJob::start(std::function<void()> task) {
+  BRAID_ASSERT(!thread_.joinable());
+  done_ = false;
+  failure_ = nullptr;
+  thread_ = std::thread([this, task = std::move(task)] {
+    try {
+      task();
+    } catch (...) {
+      failure_ = std::current_exception();
+    }
+    done_ = true;
+  });
+}
+
+void BackgroundJob::wait() {
+  if (thread_.joinable()) thread_.join();
+}
+
+bool BackgroundJob::collect(std::exception_ptr& failure) {
+  if (!thread_.joinable() || !done_.load()) return false;
+  thread_.join();
+  failure = failure_;
+  return true;
+}
+
+Publisher::Publisher(PublishOptions options, const Session& session)
+    : options_(std::move(options)),
+      combines_(!options_.image.combine.wanted().empty() || !options_.image.combine.denoisers.empty()),
+      session_(session),
+      schedule_(options_.saveEvery, options_.targetError, combines_) {
+  const int threads = options_.threads > 0 ? options_.threads : tbb::info::default_concurrency();
+  helpers_ = std::max(1, threads / 4);
+  machineShare_ = static_cast<double>(helpers_) / threads;
+}
+
+Publisher::~Publisher() {
+  cancel_ = true;
+  imageJob_.wait();
+  stateJob_.wait();
+}
+
+Estimates describedEstimates(const Session& session, bool timing) {
+  Estimates e = *session.snapshot();
+  e.attributes = session.state().attributes;
+  for (Attribute& a : passAttributes(e, session.state().seconds, timing)) e.attributes.push_back(std::move(a));
+  return e;
+}
+
+void Publisher::fail(std::vector<Publication>& news, const std::exception_ptr& failure, const Publication& of) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const std::exception& e) {
+    if (!told_.insert(e.what()).second) return;
+    news.push_back(of);
+    news.back().failure = e.what();
+  }
+}
+
+void Publisher::collect(std::vector<Publication>& news) {
+  std::exception_ptr failure;
+  if (imageJob_.collect(failure)) {
+    const double cost = heldUp_ + took_ * machineShare_;
+    // What a cancelled method throws is no news.
+    if (failure && cancel_) pending_.image.cancelled = true;
+    // The error of the plain image is not that of the combined one.
+    if (combines_ && !pending_.combined) pending_.image.error.reset();
+    if (pending_.image.cancelled)
+      schedule_.givenUp(cost);
+    else
+      schedule_.published(pending_.spp, pending_.combined, cost, failure ? std::nullopt : pending_.image.error);
+    if (failure && !pending_.image.cancelled)
+      fail(news, failure, pending_);
+    else if (!pending_.image.cancelled)
+      news.push_back(pending_);
+    reached_ = schedule_.reached();
+  }
+  if (stateJob_.collect(failure) && failure) fail(news, failure, saving_);
+}
+
+void Publisher::saveState(const Progress& p, std::vector<Publication>& news) {
+  const Clock clock;
+  saving_ = {samplesOf(session_.state()), p.seconds, false, {}, {}};
+  try {
+    std::shared_ptr<OutputFile> file = beginStateFile(options_.checkpoint, session_.state());
+    stateJob_.start([file] { file->finish(); });
+  } catch (const Error&) {
+    fail(news, std::current_exception(), saving_);
+  }
+  schedule_.spend(clock.seconds());
+}
+
+void Publisher::publishImage(const Progress& p, bool combined) {
+  const Clock clock;
+  cancel_ = false;
+  pending_ = {samplesOf(session_.state()), p.seconds, combined, {}, {}};
+  auto output = std::make_shared<ImageOutput>(options_.image);
+  if (!combined) {
+    output->combine.combine = "none";
+    output->combine.denoisers.clear();
+  }
+  auto shown = std::make_shared<Estimates>(describedEstimates(session_, !options_.image.noTiming));
+  const auto alpha = std::make_shared<std::optional<Plane<float>>>(session_.alpha());
+  heldUp_ = clock.seconds();
+  jobStart_ = std::chrono::steady_clock::now();
+  imageJob_.start([this, output, shown, alpha] {
+    const Clock job;
+    try {
+      pending_.image = writeImage(*output, std::move(*shown), *alpha ? &**alpha : nullptr, helpers_, &cancel_);
+    } catch (...) {
+      took_ = job.seconds();
+      throw;
+    }
+    took_ = job.seconds();
+  });
+}
+
+void Publisher::giveUpIfTooLong(const Progress& p) {
+  if (!imageJob_.running() || !pending_.combined) return;
+  const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - jobStart_).count();
+  if (schedule_.tooLong(p, heldUp_ + took * machineShare_)) cancel_ = true;
+}
+
+std::vector<Publication> Publisher::round(const Progress& p) {
+  std::vector<Publication> news;
+  collect(news);
+  giveUpIfTooLong(p);
+  PublicationSchedule::Due due = schedule_.due(p);
+  due.image = due.image && hasImage() && !imageJob_.running();
+  due.state = due.state && !options_.checkpoint.empty() && !stateJob_.running();
+  if (due.state) saveState(p, news);
+  if (due.image) publishImage(p, due.combined);
+  schedule_.begun(due, p);
+  return news;
+}
+
+WrittenImage Publisher::finish() {
+  cancel_ = true;
+  imageJob_.wait();
+  stateJob_.wait();
+  std::exception_ptr failure;
+  if (!options_.checkpoint.empty()) {
+    try {
+      writeStateFile(options_.checkpoint, session_.state());
+    } catch (const Error&) {
+      failure = std::current_exception();
+    }
+  }
+  WrittenImage written;
+  if (hasImage()) {
+    const std::optional<Plane<float>> alpha = session_.alpha();
+    written = writeImage(options_.image, describedEstimates(session_, !options_.image.noTiming),
+                         alpha ? &*alpha : nullptr, options_.threads);
+  }
+  if (failure) std::rethrow_exception(failure);
+  return written;
+}
+
+}  // namespace braid

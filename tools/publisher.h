@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// Shows and saves what a render has while it goes on. The pass loop is held up for as long as it takes to copy the
+// estimates and, with a checkpoint, to hand its bytes to the system; combining, compressing and waiting for the disk
+// happen beside it. Files are replaced whole, so a reader or a crash finds the last complete one.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <exception>
+#include <functional>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "renderer/session/session.h"
+#include "tools/image_output.h"
+#include "tools/publication_schedule.h"
+
+namespace braid {
+
+// One task at a time on a thread of its own.
+class BackgroundJob {
+ public:
+  ~BackgroundJob() { wait(); }
+  bool running() const { return thread_.joinable() && !done_.load(); }
+  // The one before must have ended.
+  void start(std::function<void()> task);
+  void wait();
+  // Once after the task has ended: true, and what it threw if anything.
+  bool collect(std::exception_ptr& failure);
+
+ private:
+  std::thread thread_;
+  std::atomic<bool> done_{false};
+  std::exception_ptr failure_;
+};
+
+struct PublishOptions {
+  ImageOutput image;
+  std::string checkpoint;  // empty: none
+  double saveEvery = 60;   // seconds
+  double targetError = 0;  // 0: none
+  int threads = 0;         // of the render
+};
+
+// Something that was published, or was to be.
+struct Publication {
+  uint64_t spp = 0;
+  double seconds = 0;     // of the run, when it was begun
+  bool combined = false;  // not yet by the combiners that were asked for, otherwise
+  WrittenImage image;
+  std::string failure;  // one line, told once for each cause; the render goes on
+};
+
+// The estimates of a session with the header of an image file; `timing`: also seconds, which differ between runs.
+Estimates describedEstimates(const Session& session, bool timing);
+
+class Publisher {
+ public:
+  Publisher(PublishOptions options, const Session& session);
+  // Waits for what is being written; a combiner at work is cancelled.
+  ~Publisher();
+
+  // After each round, from the session's callback: publishes if it is time. What has been published meanwhile, or could
+  // not be, is returned.
+  std::vector<Publication> round(const Progress& progress);
+
+  // For Session::run(): the published error met the target.
+  const std::atomic<bool>& reached() const { return reached_; }
+
+  // After the run: saves the state and the final image. Both are tried; throws Error(OutputFailed) of the first that
+  // failed.
+  WrittenImage finish();
+
+ private:
+  void collect(std::vector<Publication>& news);
+  void fail(std::vector<Publication>& news, const std::exception_ptr& failure, const Publication& of);
+  void saveState(const Progress& progress, std::vector<Publication>& news);
+  void publishImage(const Progress& progress, bool combined);
+  void giveUpIfTooLong(const Progress& progress);
+  bool hasImage() const { return options_.image.show || !options_.image.files().empty(); }
+
+  const PublishOptions options_;
+  const bool combines_;
+  const Session& session_;
+  PublicationSchedule schedule_;
+  int helpers_ = 1;          // threads of a publication
+  double machineShare_ = 1;  // of the machine that they are
+  std::atomic<bool> reached_{false}, cancel_{false};
+  Publication pending_, saving_;
+  double heldUp_ = 0;  // seconds for which the pending publication stopped the pass loop
+  double took_ = 0;    // seconds of the job beside it
+  std::chrono::steady_clock::time_point jobStart_;
+  std::set<std::string> told_;
+  BackgroundJob imageJob_, stateJob_;
+};
+
+}  // namespace braid
