@@ -115,6 +115,7 @@ Estimate shrunkTowards(const Estimate& base, const Estimate& x, const Rgb<float>
   JamesSteinSettings settings;
   settings.constant = 1;
   settings.gate = true;
+  settings.filter = VarianceFilter::Whitened;
   Estimate out;
   out.name = "js@" + base.name;
   out.mean = jamesStein(x.mean, variance, base.mean, settings).image;

@@ -23,7 +23,7 @@ const OptionInfo kConstant{"js-constant", 1.25,
                            "Shrinkage relative to the papers' p - 2; below 2, it beats the unbiased image"};
 const OptionInfo kRegression{"js-regression", 1,
                              "1: fit the biased image to the unbiased one first, 0: use it as it is"};
-const OptionInfo kVariance{"js-variance", 0, "Filter of the variance: 0 box, 1 Gaussian, 2 robust"};
+const OptionInfo kVariance{"js-variance", 0, "Variance of a block: 0 box, 1 Gaussian, 2 robust, 3 whitened"};
 const OptionInfo kSigma{"js-sigma", 3, "Standard deviation of the Gaussian filter of the variance in pixels"};
 const OptionInfo kCrossed{"js-crossed", 0, "1: combine each half with the fit of the other one, then average"};
 const OptionInfo kGlobal{"js-global", 0, "1: one factor for the whole image"};
@@ -59,9 +59,9 @@ class JamesStein : public Method {
 JamesSteinSettings settingsOf(const MethodOptions& o) {
   JamesSteinSettings s;
   s.constant = std::max(0.0, o.number(kConstant));
-  s.filter = o.number(kVariance) >= 2   ? VarianceFilter::Robust
-             : o.number(kVariance) >= 1 ? VarianceFilter::Gaussian
-                                        : VarianceFilter::Box;
+  constexpr VarianceFilter kFilters[] = {VarianceFilter::Box, VarianceFilter::Gaussian, VarianceFilter::Robust,
+                                         VarianceFilter::Whitened};
+  s.filter = kFilters[static_cast<int>(std::clamp(o.number(kVariance), 0.0, 3.0))];
   s.sigma = o.number(kSigma);
   s.global = o.number(kGlobal) != 0;
   s.positivePart = o.number(kPositivePart) != 0;

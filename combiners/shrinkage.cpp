@@ -69,6 +69,18 @@ Plane<double> numerators(const Plane<double>& variance, const JamesSteinSettings
   return out;
 }
 
+// What a difference is measured in, squared.
+Plane<double> units(const Plane<float>& variance) {
+  Plane<double> roots(variance.width, variance.height);
+  forAll(roots.size(), [&](size_t i) { roots[i] = std::sqrt(std::sqrt(static_cast<double>(variance[i]))); });
+  Plane<double> out = mirrorBoxMean(roots, 3);
+  forAll(out.size(), [&](size_t i) {
+    const double around = out[i] * out[i] * out[i] * out[i];
+    out[i] = std::max(0.5 * (static_cast<double>(variance[i]) + around), 1e-30);
+  });
+  return out;
+}
+
 double total(const Plane<double>& in) {
   return parallelSum(in.size(), kChunk, 0.0, [&](size_t begin, size_t end) {
     double sum = 0;
@@ -130,10 +142,12 @@ ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rg
       settings.gate ? gated(x, variance, y, settings.radius) : std::vector<char>(x.size(), char{0});
   for (size_t c = 0; c < 3; ++c) {
     Plane<double> squares(width, height), noise(width, height);
+    const Plane<double> unit =
+        settings.filter == VarianceFilter::Whitened ? units(variance[c]) : Plane<double>(width, height, 1.0);
     forAll(x.size(), [&](size_t i) {
       const auto value = static_cast<double>(x[c][i]), difference = value - static_cast<double>(y[c][i]);
-      squares[i] = gate[i] ? 0.0 : std::max(difference * difference, kRelativeLeast * value * value);
-      noise[i] = gate[i] ? 0.0 : static_cast<double>(variance[c][i]);
+      squares[i] = gate[i] ? 0.0 : std::max(difference * difference, kRelativeLeast * value * value) / unit[i];
+      noise[i] = gate[i] ? 0.0 : static_cast<double>(variance[c][i]) / unit[i];
     });
     const Plane<double> factor = factors(squares, noise, settings);
     forAll(x.size(), [&](size_t i) {

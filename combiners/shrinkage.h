@@ -18,7 +18,12 @@ namespace braid {
 enum class VarianceFilter {
   Box,       // sigma_c² is the mean variance of the very block: an outlier counts alike in sigma² and in SSE
   Gaussian,  // about the centre of the block: an outlier at the rim is in SSE only, and survives
-  Robust     // Σ s² - 2 max s² in place of (p - 2) sigma²: Stein's condition for unequal variances; keeps outliers
+  Robust,    // Σ s² - 2 max s² in place of (p - 2) sigma²: Stein's condition for unequal variances; keeps outliers
+  // Every pixel of the block counts in units of its own variance, Σ (x_i - y_i)² / s_i² against (p - 2): a lamp's
+  // mirror image, noisy by itself, no longer hides what is wrong with Y in the quiet pixels around it, and an outlier
+  // counts as one pixel. Variances are first averaged with the fourth power of the 7x7 mean of their fourth roots, so
+  // that a pixel of no variance does not decide alone.
+  Whitened
 };
 
 struct JamesSteinSettings {

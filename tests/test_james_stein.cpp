@@ -433,3 +433,25 @@ TEST_CASE("The number of threads changes no bit of James-Stein") {
     CHECK(identical(results[0].error, results[i].error));
   }
 }
+
+TEST_CASE("Whitened, a noisy lamp does not hide what Y gets wrong beside it") {
+  // Quiet pixels that Y gets wrong by 30 of their deviations, about one pixel with 10⁹ times their variance.
+  const int size = 31;
+  Rgb<float> x(size, size, 1.0f), y(size, size, 1.3f), variance(size, size, 1e-4f);
+  const size_t lamp = x[0].index(15, 15);
+  for (size_t c = 0; c < 3; ++c) {
+    x[c][lamp] = 500;
+    y[c][lamp] = 100;
+    variance[c][lamp] = 1e5f;
+  }
+  JamesSteinSettings box, whitened;
+  whitened.filter = VarianceFilter::Whitened;
+  const size_t beside = x[0].index(18, 13);
+  CHECK(jamesStein(x, variance, y, box).image[0][beside] > 1.15f);
+  CHECK(jamesStein(x, variance, y, whitened).image[0][beside] < 1.02f);
+  // Equal variances: the units cancel.
+  for (size_t c = 0; c < 3; ++c) x[c][lamp] = 1, y[c][lamp] = 1.3f, variance[c][lamp] = 1e-4f;
+  for (const size_t i : {beside, lamp})
+    CHECK(jamesStein(x, variance, y, whitened).factor[1][i] ==
+          doctest::Approx(jamesStein(x, variance, y, box).factor[1][i]).epsilon(1e-4));
+}

@@ -14,6 +14,7 @@
 #include "integrators/registry.h"
 #include "integrators/sppm_throughput.h"
 #include "renderer/core/hash.h"
+#include "tools/bench_combining.h"
 #include "tools/builtin_scenes.h"
 #include "tools/cli.h"
 #include "version.h"
@@ -25,7 +26,7 @@ namespace {
 struct BenchOptions {
   std::vector<std::string> scenes;
   SampleChoice samples;
-  std::string size = "512x512", isa = "avx2";
+  std::string size = "512x512", isa = "avx2", combine;
   int repeats = 5;
   bool json = false;
 };
@@ -198,11 +199,7 @@ nlohmann::json benchScene(const SceneSource& source, const BenchOptions& o, cons
           {"peakMemoryBytes", peakMemory()}};
 }
 
-int runBench(const BenchOptions& o) {
-  SceneChoice view;
-  view.size = o.size;
-  Settings settings = makeSettings(view, o.samples);
-  settings.features = false;
+std::vector<SceneSource> sourcesOf(const BenchOptions& o) {
   std::vector<SceneSource> sources;
   const std::vector<SceneSource> builtin{{"builtin:cornell", [] { return cornellBox(); }},
                                          {"builtin:million", [] { return cornellBox(1'000'000); }}};
@@ -218,7 +215,42 @@ int runBench(const BenchOptions& o) {
                            return loadScene(choice);
                          }});
   }
-  if (sources.empty()) sources = builtin;
+  if (sources.empty()) sources = o.combine.empty() ? builtin : std::vector{builtin[0]};
+  return sources;
+}
+
+// Denoisers and combiners instead of rays.
+int runCombiningBench(const BenchOptions& o, const Settings& settings) {
+  nlohmann::json all = nlohmann::json::array();
+  for (const SceneSource& source : sourcesOf(o)) {
+    SceneChoice choice;
+    choice.isa = o.isa;
+    SceneData data = source.load();
+    const CameraData camera = chooseCamera(data, choice);
+    const std::unique_ptr<Scene> scene = buildScene(std::move(data), choice);
+    const nlohmann::json methods = benchCombining(*scene, camera, settings, splitList(o.combine), o.repeats);
+    all.push_back({{"scene", source.name}, {"methods", methods}});
+    if (o.json) continue;
+    fmt::print("{}: {}x{}, {} spp\n", source.name, settings.width, settings.height, settings.spp);
+    for (const nlohmann::json& m : methods)
+      if (m.contains("obstacle"))
+        fmt::print("  {}: {}\n", m["method"].get<std::string>(), m["obstacle"].get<std::string>());
+      else
+        fmt::print("  {}: {:.3f} s, {:.2f} s a megapixel\n", m["method"].get<std::string>(), m["seconds"].get<double>(),
+                   m["secondsPerMegapixel"].get<double>());
+  }
+  if (o.json)
+    fmt::print("{}\n", nlohmann::json({{"schema", 1}, {"build", BRAID_BUILD_FLAGS}, {"combining", all}}).dump(2));
+  return 0;
+}
+
+int runBench(const BenchOptions& o) {
+  SceneChoice view;
+  view.size = o.size;
+  Settings settings = makeSettings(view, o.samples);
+  if (!o.combine.empty()) return runCombiningBench(o, settings);
+  settings.features = false;
+  const std::vector<SceneSource> sources = sourcesOf(o);
   nlohmann::json all = nlohmann::json::array();
   for (const SceneSource& source : sources) {
     const nlohmann::json r = benchScene(source, o, settings);
@@ -271,6 +303,8 @@ void addBench(CLI::App& app, Action& action) {
       ->check(CLI::Range(1, 1000));
   command->add_option("--isa", o.isa, "Instruction set for Embree: avx2, avx512, sse4.2, or auto")
       ->capture_default_str();
+  command->add_option("--combine", o.combine,
+                      "Measure these denoisers and combiners, separated by commas, instead of rays");
   command->add_flag("--json", o.json, "As JSON");
   addSampleOptions(*command, o.samples);
   command->callback([options, &action] { action = [options] { return runBench(*options); }; });

@@ -84,16 +84,29 @@ struct Parsed {
   throw Error(ExitCode::Usage, fmt::format("--methods: {}: {}", name, reason));
 }
 
+// The integrators of "bdpt+sppm"; none if one of the names is not known.
+std::vector<const Integrator*> joinedIntegrators(const std::string& text, const Integrators& integrators) {
+  std::vector<const Integrator*> list;
+  for (size_t begin = 0; begin <= text.size();) {
+    const size_t end = std::min(text.find('+', begin), text.size());
+    const Integrator* i = findIntegrator(integrators, text.substr(begin, end - begin));
+    if (!i) return {};
+    if (std::find(list.begin(), list.end(), i) == list.end()) list.push_back(i);
+    begin = end + 1;
+  }
+  return list;
+}
+
 // Integrators that a name speaks of: before a slash or pt, and after each '@'.
 std::vector<const Integrator*> namedIntegrators(const std::string& name, std::string& method,
                                                 const Integrators& integrators) {
   // A slash may also be part of a file's path: external:folder/file.exr.
   const size_t slash = name.find('/');
-  const Integrator* first = slash == std::string::npos ? nullptr : findIntegrator(integrators, name.substr(0, slash));
-  method = first ? name.substr(slash + 1) : name;
-  if (!first) first = findIntegrator(integrators, "pt");
-  if (!first) refuse(name, "there is no integrator pt: name one before a slash");
-  std::vector<const Integrator*> list{first};
+  std::vector<const Integrator*> list;
+  if (slash != std::string::npos) list = joinedIntegrators(name.substr(0, slash), integrators);
+  method = list.empty() ? name : name.substr(slash + 1);
+  if (list.empty() && findIntegrator(integrators, "pt")) list = {findIntegrator(integrators, "pt")};
+  if (list.empty()) refuse(name, "there is no integrator pt: name one before a slash");
   for (size_t at = method.find('@'); at != std::string::npos; at = method.find('@', at + 1)) {
     const Integrator* i = findIntegrator(integrators, method.substr(at + 1, method.find('@', at + 1) - at - 1));
     if (i && std::find(list.begin(), list.end(), i) == list.end()) list.push_back(i);

@@ -10,10 +10,11 @@
 namespace braid {
 
 // The methods of these names: integrators, and denoisers and combiners in the forms that recipes know (combiners/
-// recipe.h), of the estimate of pt or of another integrator named before a slash: nfor, js, js@sppm, bdpt/nfor. An
-// integrator after '@' is rendered too, and the first registered one with correlated pixels for methods that need it.
-// Methods of the same inputs run together, so that each denoiser runs once a snapshot; their seconds still count it
-// for every method that reads it. Throws Error(Usage) naming unknown names and what keeps a method from running.
+// recipe.h), of the estimate of pt or of another integrator named before a slash: nfor, js, js@sppm, bdpt/nfor; or of
+// several, of which the first is improved: bdpt+sppm/auto. An integrator after '@' is rendered too, and the first
+// registered one with correlated pixels for methods that need it. Methods of the same inputs run together, so that each
+// denoiser runs once a snapshot; their seconds still count it for every method that reads it. Throws Error(Usage)
+// naming unknown names and what keeps a method from running.
 std::vector<SweepMethod> sweepMethods(const std::vector<std::string>& names,
                                       const std::vector<const Integrator*>& integrators);
 
