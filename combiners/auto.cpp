@@ -115,6 +115,7 @@ Estimate shrunkTowards(const Estimate& base, const Estimate& x, const Rgb<float>
   JamesSteinSettings settings;
   settings.constant = 1;
   settings.gate = true;
+  settings.shared = true;
   settings.filter = VarianceFilter::Whitened;
   Estimate out;
   out.name = "js@" + base.name;
@@ -141,6 +142,7 @@ WeightMaps weightsOf(const std::vector<const Estimate*>& candidates, const Estim
   EnsembleChoices choices;
   choices.patchRadius = static_cast<int>(std::clamp(in.options.number(kPatch), 1.0, 101.0)) / 2;
   choices.rootWeights = &root;
+  choices.shared = true;
   const WeightMaps raw = ensembleWeights(x, candidates, choices);
   return filteredWeights(raw, weightedEstimate(raw, candidates), in.features);
 }

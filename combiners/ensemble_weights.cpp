@@ -25,8 +25,8 @@ class TileWeights {
 
  private:
   void startSums(const PixelRect& tile);
-  void errorsOfRow(size_t c, int y);
-  void addChannel(size_t c);
+  void errorsOfRow(size_t c, int y, double* out);
+  void addChannels(size_t first, size_t last);
   void addPatchRow(size_t pair, const double* products, int y);
   void writeWeights(size_t c, WeightMaps& out);
 
@@ -34,8 +34,9 @@ class TileWeights {
   const std::vector<const Estimate*>& bases_;
   const EnsembleChoices& choices_;
   size_t pairs_;
-  PixelRect tile_, samples_;                // the pixels solved, and those in their patches
-  std::vector<double> errors_;              // three terms a base and column: e^A, e^B, (y^A - y^B) / sqrt(2)
+  PixelRect tile_, samples_;  // the pixels solved, and those in their patches
+  // Of a row, three terms a channel, base and column: e^A, e^B, (y^A - y^B) / sqrt(2).
+  std::vector<double> errors_;
   std::vector<double> products_, rowSums_;  // of one row and pair
   std::vector<double> sums_;                // M by pair and pixel of the tile
 };
@@ -43,18 +44,18 @@ class TileWeights {
 void TileWeights::startSums(const PixelRect& tile) {
   tile_ = tile;
   samples_ = intersection(grown(tile, choices_.patchRadius), {0, 0, x_.mean.width(), x_.mean.height()});
-  errors_.resize(3 * bases_.size() * static_cast<size_t>(samples_.width()));
+  errors_.resize((choices_.shared ? 9 : 3) * bases_.size() * static_cast<size_t>(samples_.width()));
   products_.resize(static_cast<size_t>(samples_.width()));
   rowSums_.resize(static_cast<size_t>(tile.width()));
   sums_.assign(pairs_ * static_cast<size_t>(tile.width() * tile.height()), 0.0);
 }
 
-void TileWeights::errorsOfRow(size_t c, int y) {
+void TileWeights::errorsOfRow(size_t c, int y, double* out) {
   const auto width = static_cast<size_t>(samples_.width());
   const float *xa = rowOf(x_.half[0][c], samples_.x0, y), *xb = rowOf(x_.half[1][c], samples_.x0, y);
   for (size_t b = 0; b < bases_.size(); ++b) {
     const float *ya = rowOf(bases_[b]->half[0][c], samples_.x0, y), *yb = rowOf(bases_[b]->half[1][c], samples_.x0, y);
-    double *ea = errors_.data() + 3 * b * width, *eb = ea + width, *d = eb + width;
+    double *ea = out + 3 * b * width, *eb = ea + width, *d = eb + width;
     for (size_t i = 0; i < width; ++i) {
       ea[i] = static_cast<double>(ya[i]) - static_cast<double>(xb[i]);
       eb[i] = static_cast<double>(yb[i]) - static_cast<double>(xa[i]);
@@ -84,17 +85,23 @@ void TileWeights::addPatchRow(size_t pair, const double* products, int y) {
   }
 }
 
-void TileWeights::addChannel(size_t c) {
+// Adds the errors of the channels [first, last) to the sums.
+void TileWeights::addChannels(size_t first, size_t last) {
   const auto width = static_cast<size_t>(samples_.width());
+  const size_t ofChannel = 3 * bases_.size() * width;
   for (int y = samples_.y0; y < samples_.y1; ++y) {
-    errorsOfRow(c, y);
+    for (size_t c = first; c < last; ++c) errorsOfRow(c, y, errors_.data() + (c - first) * ofChannel);
     size_t pair = 0;
     for (size_t i = 0; i < bases_.size(); ++i)
       for (size_t j = 0; j <= i; ++j, ++pair) {
-        const double *p = errors_.data() + 3 * i * width, *q = errors_.data() + 3 * j * width;
-        // Both halves and the reduction; a common factor of two does not matter.
-        for (size_t k = 0; k < width; ++k)
-          products_[k] = p[k] * q[k] + p[width + k] * q[width + k] - p[2 * width + k] * q[2 * width + k];
+        std::fill(products_.begin(), products_.end(), 0.0);
+        for (size_t c = first; c < last; ++c) {
+          const double* errors = errors_.data() + (c - first) * ofChannel;
+          const double *p = errors + 3 * i * width, *q = errors + 3 * j * width;
+          // Both halves and the reduction; a common factor of two does not matter.
+          for (size_t k = 0; k < width; ++k)
+            products_[k] += p[k] * q[k] + p[width + k] * q[width + k] - p[2 * width + k] * q[2 * width + k];
+        }
         addPatchRow(pair, products_.data(), y);
       }
   }
@@ -125,10 +132,11 @@ void TileWeights::writeWeights(size_t c, WeightMaps& out) {
 
 void TileWeights::solve(const PixelRect& tile, WeightMaps& out) {
   startSums(tile);
-  for (size_t c = 0; c < 3; ++c) {
-    if (!choices_.shared) std::fill(sums_.begin(), sums_.end(), 0.0);
-    runVectorised([&] { addChannel(c); });
-    if (!choices_.shared || c == 2) writeWeights(c, out);
+  const size_t together = choices_.shared ? 3 : 1;
+  for (size_t c = 0; c < 3; c += together) {
+    std::fill(sums_.begin(), sums_.end(), 0.0);
+    runVectorised([&] { addChannels(c, c + together); });
+    writeWeights(c, out);
   }
 }
 

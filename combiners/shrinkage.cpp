@@ -140,22 +140,29 @@ ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rg
   ShrunkImage out{Rgb<float>(width, height), Rgb<float>(width, height)};
   const std::vector<char> gate =
       settings.gate ? gated(x, variance, y, settings.radius) : std::vector<char>(x.size(), char{0});
-  for (size_t c = 0; c < 3; ++c) {
-    Plane<double> squares(width, height), noise(width, height);
+  // Adds a channel in its units.
+  const auto add = [&](size_t c, double weight, Plane<double>& squares, Plane<double>& noise) {
     const Plane<double> unit =
         settings.filter == VarianceFilter::Whitened ? units(variance[c]) : Plane<double>(width, height, 1.0);
     forAll(x.size(), [&](size_t i) {
+      if (gate[i]) return;
       const auto value = static_cast<double>(x[c][i]), difference = value - static_cast<double>(y[c][i]);
-      squares[i] = gate[i] ? 0.0 : std::max(difference * difference, kRelativeLeast * value * value) / unit[i];
-      noise[i] = gate[i] ? 0.0 : static_cast<double>(variance[c][i]) / unit[i];
+      squares[i] += weight * std::max(difference * difference, kRelativeLeast * value * value) / unit[i];
+      noise[i] += weight * static_cast<double>(variance[c][i]) / unit[i];
     });
+  };
+  const size_t together = settings.shared ? 3 : 1;
+  for (size_t first = 0; first < 3; first += together) {
+    Plane<double> squares(width, height), noise(width, height);
+    for (size_t c = first; c < first + together; ++c) add(c, 1.0 / static_cast<double>(together), squares, noise);
     const Plane<double> factor = factors(squares, noise, settings);
-    forAll(x.size(), [&](size_t i) {
-      const auto other = static_cast<double>(y[c][i]);
-      const double rho = gate[i] ? 0.0 : factor[i];
-      out.image[c][i] = finiteFloat(std::max(0.0, other + rho * (static_cast<double>(x[c][i]) - other)));
-      out.factor[c][i] = finiteFloat(rho);
-    });
+    for (size_t c = first; c < first + together; ++c)
+      forAll(x.size(), [&](size_t i) {
+        const auto other = static_cast<double>(y[c][i]);
+        const double rho = gate[i] ? 0.0 : factor[i];
+        out.image[c][i] = finiteFloat(std::max(0.0, other + rho * (static_cast<double>(x[c][i]) - other)));
+        out.factor[c][i] = finiteFloat(rho);
+      });
   }
   return out;
 }

@@ -33,6 +33,7 @@ struct JamesSteinSettings {
   double sigma = 3;          // of the Gaussian, in pixels
   bool positivePart = true;  // off: factors may be negative, as in the original estimator of James and Stein
   bool global = false;       // one factor for the whole image, the original localisation: none
+  bool shared = false;       // one factor for the three channels, from the means of their squares and variances
   bool gate = false;         // lone outliers are replaced by Y first (ALGORITHMS-BEYOND 8.3.3)
 };
 

@@ -2,6 +2,8 @@
 #include "tools/estimates_file.h"
 
 #include <algorithm>
+#include <charconv>
+#include <set>
 #include <cstdlib>
 #include <filesystem>
 
@@ -49,9 +51,22 @@ std::vector<std::string> estimateNames(const ImageFile& file) {
 }
 
 // The variances after 1, 2, 4, … passes, from layers <name>.variance<passes>.
+// The passes N of the layers <layer>.varianceN, in rising order.
+std::set<uint64_t> checkpointPasses(const ImageFile& file, const std::string& layer) {
+  const std::string prefix = layer + ".variance", suffix = ".R";
+  std::set<uint64_t> passes;
+  for (const auto& [channel, plane] : file.planes) {
+    if (!channel.starts_with(prefix) || !channel.ends_with(suffix)) continue;
+    const char *begin = channel.data() + prefix.size(), *end = channel.data() + channel.size() - suffix.size();
+    uint64_t n = 0;
+    if (begin < end && std::from_chars(begin, end, n).ptr == end && n > 0) passes.insert(n);
+  }
+  return passes;
+}
+
 std::vector<Checkpoint> readHistory(const ImageFile& file, const std::string& layer, double secondsPerPass) {
   std::vector<Checkpoint> history;
-  for (uint64_t passes = 1; passes < uint64_t(1) << 40; passes *= 2) {
+  for (const uint64_t passes : checkpointPasses(file, layer)) {
     Rgb<float> variance = layerOrNone(file, layer + ".variance" + std::to_string(passes));
     if (!variance.empty())
       history.push_back({passes, secondsPerPass * static_cast<double>(passes), std::move(variance)});
