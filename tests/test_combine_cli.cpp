@@ -6,6 +6,7 @@
 
 #include <OpenImageIO/imageio.h>
 #include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
 #include <sys/wait.h>
 
 #include "combiners/pipeline.h"
@@ -299,4 +300,35 @@ TEST_CASE("Lists, plans and help show methods with their reasons and options") {
   CHECK(contains(braidRun(folder, scene).out, "- history: "));
   for (const char* command : {"combine", "render"})
     CHECK(contains(braidRun(folder, std::string(command) + " --help").out, "--box-radius"));
+}
+
+TEST_CASE("auto fuses what an auto plan rendered, offline as in process") {
+  const Folder folder;
+  const Run run = braidRun(folder, "render '" BRAID_SOURCE_DIR
+                                   "/scenes/torus_glass.glb' -q --size 48x27 --spp 8 "
+                                   "--integrator auto --combine auto --float -o a.exr --quarters --reproducible");
+  INFO(run.err);
+  REQUIRE(run.code == 0);
+  const ImageFile a = readImage(folder.path / "a.exr");
+  REQUIRE(attribute(a, "braid/auto/bases"));
+  CHECK(attribute(a, "braid/auto/bases")->text == "sppm");
+  CHECK(a.planes.count("Error.R") == 1);
+  combined(folder, "--unbiased a.exr --method auto -o b.exr");
+  CHECK(identical(a.rgb("combined.auto"), readImage(folder.path / "b.exr").rgb("combined.auto")));
+}
+
+TEST_CASE("bench tells what denoisers and combiners cost, inputs first") {
+  const Folder folder;
+  const Run run = braidRun(folder, "bench --combine pw,js@pw,uncorrelated --size 32x24 --spp 8 --repeats 1 --json");
+  INFO(run.err);
+  REQUIRE(run.code == 0);
+  const nlohmann::json methods = nlohmann::json::parse(run.out)["combining"][0]["methods"];
+  REQUIRE(methods.size() == 3);
+  for (const nlohmann::json& m : methods) {
+    CHECK(!m.contains("obstacle"));
+    CHECK(m["seconds"].get<double>() > 0);
+    CHECK(m["secondsPerMegapixel"].get<double>() ==
+          doctest::Approx(m["seconds"].get<double>() * 1e6 / (32 * 24)).epsilon(1e-6));
+  }
+  CHECK(methods[0]["method"] == "pw");
 }

@@ -356,6 +356,7 @@ TEST_CASE("Names of methods are integrators, or denoisers and combiners with the
   using Names = std::vector<std::string>;
   CHECK(inputs("pt") == Names{"pt"});
   CHECK(inputs("box") == Names{"pt"});
+  CHECK(inputs("bdpt+sppm/auto") == Names{"bdpt", "sppm"});
   for (const Integrator* i : test::integrators()) {
     const std::string name = i->name();
     if (name == "pt") continue;

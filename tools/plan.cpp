@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// `braid plan`: what would run, what is left out, and why.
+// `braid plan`: what would run, what is left out, and why; or the same render as a job for a farm.
+#include <algorithm>
+#include <filesystem>
+
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "integrators/registry.h"
+#include "renderer/core/error.h"
 #include "renderer/core/hash.h"
 #include "tools/cli.h"
-#include "tools/combining.h"
+#include "tools/farm_job.h"
+#include "tools/image_output.h"
+#include "tools/output_options.h"
 
 namespace braid {
 
@@ -15,17 +21,96 @@ namespace {
 struct PlanOptions {
   SceneChoice scene;
   SampleChoice samples;
-  CombineChoice combine;
-  bool json = false;
+  ImageOutput image;
+  bool transparent = false, json = false;
+  std::string saveEvery, checkpoint;
+  // A job for a farm instead of the plan.
+  uint64_t tasks = 0;
+  std::string format, program;
+  // The command's own options, to carry on what was given: those of the scene and samples, then those of the image.
+  std::vector<const CLI::Option*> renderOptions, imageOptions;
 };
 
+// The options of the command that `add` appends to it.
+template <class Add>
+std::vector<const CLI::Option*> added(CLI::App& command, const Add& add) {
+  const std::vector<CLI::Option*> before = command.get_options();
+  add();
+  std::vector<const CLI::Option*> list;
+  for (const CLI::Option* option : command.get_options())
+    if (std::find(before.begin(), before.end(), option) == before.end()) list.push_back(option);
+  return list;
+}
+
+// What the user gave of these options, as he gave it, without the named ones and the scene itself.
+void carry(const std::vector<const CLI::Option*>& options, const std::vector<std::string>& without,
+           std::vector<FarmOption>& list) {
+  for (const CLI::Option* option : options) {
+    if (option->count() == 0 || option->get_lnames().empty()) continue;
+    const std::string& name = option->get_lnames().front();
+    if (std::find(without.begin(), without.end(), name) != without.end()) continue;
+    if (option->get_expected_min() == 0)  // a flag
+      list.push_back({"--" + name, std::nullopt});
+    else
+      for (const std::string& value : option->results()) list.push_back({"--" + name, value});
+  }
+}
+
+// Whatever only the whole render would know to keep, each share is told to, for the merged image's sake.
+FarmJob farmJob(const PlanOptions& o, const Settings& planned) {
+  FarmJob job;
+  job.program = o.program.empty() ? std::filesystem::read_symlink("/proc/self/exe").string() : o.program;
+  job.folder = std::filesystem::current_path().string();
+  job.scene = o.scene.file;
+  job.output = o.image.exr;
+  job.spp = planned.spp;
+  job.tasks = o.tasks;
+  job.threads = o.samples.threads;
+  carry(o.renderOptions, {"spp", "threads"}, job.render);
+  carry(
+      o.imageOptions,
+      {"output", "png", "exposure", "aovs", "quarters", "history", "float", "layer-prefix", "weights", "reproducible"},
+      job.render);
+  if (o.transparent) job.render.push_back({"--transparent", std::nullopt});
+  if (!o.saveEvery.empty()) job.render.push_back({"--save-every", o.saveEvery});
+  if (planned.quarters) job.render.push_back({"--quarters", std::nullopt});
+  if (planned.history) job.render.push_back({"--history", std::nullopt});
+  job.render.push_back({"--aovs", planned.features ? "features" : "none"});
+  carry(o.imageOptions, {"output"}, job.merge);
+  if (!o.checkpoint.empty()) job.merge.push_back({"--checkpoint", o.checkpoint});
+  if (o.scene.quiet) job.merge.push_back({"--quiet", std::nullopt});
+  return job;
+}
+
+void checkJobOptions(const PlanOptions& o) {
+  if (o.tasks == 0 && o.format.empty()) return;
+  const auto refuse = [](const char* text) { throw Error(ExitCode::Usage, text); };
+  if (o.tasks == 0) refuse("--format: give --tasks, the number of shares");
+  if (o.format.empty()) refuse("--tasks: give --format slurm, opencue, flamenco or make");
+  if (o.json) refuse("--json and --tasks: a job is no JSON");
+  if (o.image.exr.empty()) refuse("--tasks: name the merged image with -o OUT.exr");
+  if (!o.samples.time.empty()) refuse("--time: shares are made of passes, so give --spp alone");
+  parseFarmFormat(o.format);
+}
+
 int runPlan(const PlanOptions& o) {
+  checkJobOptions(o);
   Settings settings = makeSettings(o.scene, o.samples);
+  settings.features = parseAovs(o.image.aovs) != AovSet::None;
+  settings.quarters = o.image.quarters;
+  settings.history = o.image.history;
+  settings.transparent = o.transparent;
+  if (o.tasks > 0) splitPasses(settings.spp, o.tasks);  // wrong numbers before the scene is loaded
   SceneData data = loadScene(o.scene);
   const CameraData camera = chooseCamera(data, o.scene);
   const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene);
   const auto integrators = makeIntegrators();
-  const Recipe recipe = planCombining(*scene, camera, settings, pointersTo(integrators), o.combine);
+  const Recipe recipe = planCombining(*scene, camera, settings, pointersTo(integrators), o.image.combine);
+  if (o.tasks > 0) {
+    requireRunnable(recipe, o.image.combine.wanted());
+    fmt::print("{}", farmJobText(farmJob(o, settings), parseFarmFormat(o.format)));
+    return 0;
+  }
   const Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
   const size_t memory[] = {scene->accel().bytes(), scene->geometryBytes(), scene->textureBytes()};
   if (!o.json) {
@@ -60,16 +145,42 @@ int runPlan(const PlanOptions& o) {
 
 void addPlan(CLI::App& app, Action& action) {
   auto options = std::make_shared<PlanOptions>();
-  CLI::App* command = app.add_subcommand("plan", "Print what a render would keep and leave out, and why");
-  command->footer("Example:\n  braid plan scene.glb --integrator auto");
-  addSceneOptions(*command, options->scene);
-  addSampleOptions(*command, options->samples);
-  command
-      ->add_option("--combine", options->combine.combine,
-                   "none, or denoisers and combiners separated by commas (--list)")
-      ->capture_default_str();
-  addCombineOptions(*command, options->combine);
-  command->add_flag("--json", options->json, "As JSON");
+  PlanOptions& o = *options;
+  CLI::App* command =
+      app.add_subcommand("plan", "Print what a render would keep and leave out, and why; or a job for a farm");
+  command->footer(
+      "Takes the options of `braid render`. With --tasks and --format, standard output is a job: shares of the passes\n"
+      "that go on from their checkpoints when started again, and a merge that waits for them. It runs in the folder\n"
+      "where it was printed, which all machines have to share.\n"
+      "Examples:\n"
+      "  braid plan scene.glb --integrator auto\n"
+      "  braid plan scene.glb -o out.exr --spp 4096 --combine auto --tasks 16 --format slurm > job.sh\n"
+      "      bash job.sh --partition=long --time=8:00:00       (options of sbatch)\n"
+      "  braid plan scene.glb -o out.exr --spp 1024 --threads 4 --tasks 8 --format make > job.mk\n"
+      "      make -j2 -f job.mk\n"
+      "  braid plan scene.glb -o out.exr --spp 4096 --tasks 16 --format opencue > job.py\n"
+      "      SHOW=testing python3 job.py\n"
+      "  braid plan scene.glb -o out.exr --spp 4096 --tasks 16 --format flamenco > braid_out.js\n"
+      "      (a job type for Flamenco Manager's folder scripts; the file says how to submit)");
+  o.renderOptions = added(*command, [&] {
+    addSceneOptions(*command, o.scene);
+    addSampleOptions(*command, o.samples);
+  });
+  o.imageOptions = added(*command, [&] { addImageOptions(*command, o.image); });
+  command->add_flag("--transparent", o.transparent, "Alpha channel; camera rays that miss add nothing");
+  command->add_flag("--json", o.json, "As JSON");
+  const char* group = "Job for a farm";
+  command->add_option("--tasks", o.tasks, "Print a job of this many shares instead of the plan")
+      ->check(CLI::Range(uint64_t(1), uint64_t(100000)))
+      ->group(group);
+  command->add_option("--format", o.format, "The farm that the job is for: slurm, opencue, flamenco or make")
+      ->group(group);
+  command->add_option("--program", o.program, "The braid that the machines run (default: this one, by its full path)")
+      ->group(group);
+  command->add_option("--save-every", o.saveEvery, "How often shares save their checkpoints (default: as render)")
+      ->group(group);
+  command->add_option("--checkpoint", o.checkpoint, "Also write the merged sums as a state, to resume or merge on")
+      ->group(group);
   command->callback([options, &action] { action = [options] { return runPlan(*options); }; });
 }
 
