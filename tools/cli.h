@@ -21,6 +21,7 @@ namespace braid {
 using Action = std::function<int()>;
 
 void addRender(CLI::App& app, Action& action);
+void addPreview(CLI::App& app, Action& action);
 void addPlan(CLI::App& app, Action& action);
 void addInfo(CLI::App& app, Action& action);
 void addBench(CLI::App& app, Action& action);

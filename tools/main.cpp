@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
   app.add_flag("--list", list, "Print every registered integrator, denoiser, combiner and metric");
   Action action;
   addRender(app, action);
+  addPreview(app, action);
   addPlan(app, action);
   addInfo(app, action);
   addCompare(app, action);

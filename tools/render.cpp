@@ -18,6 +18,7 @@
 #include "tools/progress_line.h"
 #include "tools/publisher.h"
 #include "tools/scene_identity.h"
+#include "tools/tev_client.h"
 #include "version.h"
 
 namespace braid {
@@ -28,7 +29,7 @@ struct RenderOptions {
   SceneChoice scene;
   SampleChoice samples;
   ImageOutput image;
-  std::string logJson, checkpoint, resumeFile, passes, saveEvery = "60";
+  std::string logJson, checkpoint, resumeFile, passes, saveEvery = "60", tev;
   bool resume = false, transparent = false;
   double error = 0;
 
@@ -180,6 +181,30 @@ void checkOutputs(const RenderOptions& o) {
   }
 }
 
+// What goes to the viewer of --tev with each publication, and what it says of it.
+class Viewer {
+ public:
+  explicit Viewer(const RenderOptions& o) : title_(std::filesystem::path(o.scene.file).filename().string()) {
+    if (!o.tev.empty()) tev_.emplace(o.tev);
+  }
+  // `image` with the viewer; this must outlive its use.
+  ImageOutput with(ImageOutput image) {
+    if (tev_) image.show = [this](const ImageViews& views) { showInTev(*tev_, title_, views); };
+    return image;
+  }
+  // What could not be shown, as a publication that failed.
+  void addFailure(std::vector<Publication>& news) {
+    if (std::string text = tev_ ? tev_->takeWarning() : ""; !text.empty()) {
+      news.emplace_back();
+      news.back().failure = std::move(text);
+    }
+  }
+
+ private:
+  const std::string title_;
+  std::optional<TevClient> tev_;
+};
+
 // What the run comes to: interrupted, short of its target, or neither.
 int exitCode(const RenderResult& result, const RenderOptions& o, const WrittenImage& written) {
   if (result.reason == StopReason::Cancelled) return static_cast<int>(ExitCode::Interrupted);
@@ -192,6 +217,7 @@ int exitCode(const RenderResult& result, const RenderOptions& o, const WrittenIm
 int runRender(const RenderOptions& o) {
   Settings settings = renderSettings(o);
   checkOutputs(o);
+  Viewer viewer(o);
   const double saveEvery = parseDuration(o.saveEvery);
   JsonLog json(o.logJson);
   const std::atomic<bool>& interrupted = installInterruptHandler();
@@ -215,10 +241,12 @@ int runRender(const RenderOptions& o) {
   earlier.reset();
 
   ProgressLine line(o.scene.quiet);
-  Publisher publisher({o.image, o.checkpoint, saveEvery, o.error, settings.threads}, session);
+  Publisher publisher({viewer.with(o.image), o.checkpoint, saveEvery, o.error, settings.threads}, session);
   const RenderResult result = session.run(
       [&](const Progress& p) {
-        tellNews(publisher.round(p), o, json);
+        std::vector<Publication> news = publisher.round(p);
+        viewer.addFailure(news);
+        tellNews(news, o, json);
         line.update(p);
         json.write("progress", {{"spp", p.round}, {"seconds", p.seconds}, {"secondsLeft", p.secondsLeft}});
         return true;
@@ -244,6 +272,7 @@ void addRender(CLI::App& app, Action& action) {
       "  braid render scene.glb -o out.exr --time 2m --env sky.hdr --png out.png\n"
       "  braid render scene.glb -o out.exr --error 0.001 --time 1h\n"
       "  braid render scene.glb -o out.exr --spp 4096 --checkpoint run.state --resume\n"
+      "  braid render scene.glb -o out.exr --spp 4096 --combine auto --tev 127.0.0.1:14158\n"
       "  braid render scene.glb --passes 256:512 --checkpoint part1.state    (then: braid merge)");
   addSceneOptions(*command, o.scene);
   addSampleOptions(*command, o.samples);
@@ -268,6 +297,8 @@ void addRender(CLI::App& app, Action& action) {
       ->capture_default_str();
   command->add_option("--passes", o.passes,
                       "Only the passes FIRST:END of every integrator: one machine's share, for `braid merge`");
+  command->add_option("--tev", o.tev, "Show what is published in tev, an image viewer that listens there")
+      ->type_name("HOST:PORT");
   command->add_option("--log-json", o.logJson, "Progress and result as JSON lines, to a file or - for standard output");
   command->callback([options, resume, &action] {
     options->resume = resume->count() > 0;

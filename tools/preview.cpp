@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+// `braid preview`: watch a scene converge, in a browser or in tev; noisy, combined and error side by side.
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "integrators/registry.h"
+#include "renderer/core/error.h"
+#include "renderer/film/output_file.h"
+#include "tools/cli.h"
+#include "tools/combining.h"
+#include "tools/header.h"
+#include "tools/interrupt.h"
+#include "tools/output_options.h"
+#include "tools/preview_board.h"
+#include "tools/preview_feed.h"
+#include "tools/preview_server.h"
+#include "tools/progress_line.h"
+#include "tools/publisher.h"
+#include "tools/scene_identity.h"
+#include "tools/tev_client.h"
+#include "version.h"
+
+namespace braid {
+
+namespace {
+
+constexpr int kPort = 8080;           // when nothing is said, and it is free
+constexpr double kFarewell = 3;       // seconds for which the end is shown to whoever watches
+constexpr double kWatchedWithin = 3;  // seconds since the last question of a page
+
+struct PreviewOptions {
+  SceneChoice scene;
+  SampleChoice samples;
+  ImageOutput image;
+  std::string tev;
+  int port = -1;              // -1: none is asked for
+  bool combineGiven = false;  // else methods that cannot run are left out
+};
+
+Settings previewSettings(const PreviewOptions& o) {
+  Settings settings = makeSettings(o.scene, o.samples);
+  if (o.samples.spp == 0 && o.samples.time.empty()) settings.spp = 0;  // until it is stopped
+  settings.features = parseAovs(o.image.aovs) != AovSet::None;
+  settings.quarters = o.image.quarters;
+  settings.history = o.image.history;
+  return settings;
+}
+
+// Whoever watches: pages by way of the board, and tev.
+class Audience {
+ public:
+  Audience(const PreviewOptions& o, std::atomic<bool>& stop)
+      : quiet_(o.scene.quiet),
+        title_(std::filesystem::path(o.scene.file).filename().string()),
+        board_(title_, o.image.files(), o.image.exposure) {
+    if (!o.tev.empty()) tev_.emplace(o.tev);
+    if (o.port < 0 && tev_) return;
+    serve(o.port, [&stop] { stop = true; });
+    fmt::print("{}\n", server_->url());
+    std::fflush(stdout);
+  }
+
+  PreviewBoard& board() { return board_; }
+
+  void show(uint64_t spp, double seconds, const ImageViews& views) {
+    board_.show(spp, seconds, views);
+    if (tev_) showInTev(*tev_, title_, views);
+  }
+
+  void warn(const std::string& text) {
+    board_.warn(text);
+    if (!quiet_) fmt::print(stderr, "warning: {} (the render goes on)\n", text);
+  }
+
+  void passWarningsOn() {
+    if (!tev_) return;
+    if (const std::string text = tev_->takeWarning(); !text.empty()) warn(text);
+  }
+
+  // Gives pages the time to fetch the last images.
+  void sayFarewell(const std::atomic<bool>& interrupted) const {
+    const auto start = std::chrono::steady_clock::now();
+    while (server_ && server_->watched(kWatchedWithin) && !interrupted &&
+           std::chrono::steady_clock::now() - start < std::chrono::duration<double>(kFarewell))
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+
+ private:
+  void serve(int port, const std::function<void()>& stop) {
+    if (port < 0) {
+      try {
+        server_.emplace(board_, kPort, stop);
+        return;
+      } catch (const Error&) {
+        port = 0;
+      }
+    }
+    server_.emplace(board_, port, stop);
+  }
+
+  const bool quiet_;
+  const std::string title_;
+  PreviewBoard board_;
+  std::optional<TevClient> tev_;
+  std::optional<PreviewServer> server_;
+};
+
+// What combiners do, as far as they can with this scene and these settings.
+Recipe planPreview(const Scene& scene, const CameraData& camera, Settings& settings,
+                   const std::vector<const Integrator*>& integrators, PreviewOptions& o, Audience& audience) {
+  Settings combining = settings;
+  const Recipe recipe = planCombining(scene, camera, combining, integrators, o.image.combine);
+  try {
+    requireRunnable(recipe, o.image.combine.wanted());
+  } catch (const Error& e) {
+    if (o.combineGiven) throw;
+    audience.warn(fmt::format("nothing is combined: {}", e.what()));
+    o.image.combine.combine = "none";
+    return {};
+  }
+  settings = combining;
+  return recipe;
+}
+
+void tellSaved(const PreviewOptions& o, const RenderResult& result, const WrittenImage& written,
+               const std::string& reason) {
+  if (o.scene.quiet) return;
+  for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
+  for (const std::string& file : o.image.files()) fmt::print(stderr, "Saved: {}\n", file);
+  fmt::print(stderr, "{} spp in {}, {}stopped by {}\n", result.estimates->estimates.front().passes,
+             formatSeconds(result.seconds),
+             written.error ? fmt::format("estimated error {:.3g}, ", *written.error) : "", reason);
+}
+
+// The last images, combined from all samples, to the files and to whoever watches. Without files an interrupted
+// preview ends at once.
+WrittenImage save(const PreviewOptions& o, const Session& session, const RenderResult& result, Audience& audience,
+                  bool interrupted) {
+  if (interrupted && o.image.files().empty()) return {};
+  audience.board().setPhase(PreviewPhase::Saving);
+  ImageOutput output = o.image;
+  output.show = [&](const ImageViews& v) {
+    audience.show(result.estimates->estimates.front().passes, result.seconds, v);
+  };
+  return writeImage(output, describedEstimates(session, !o.image.noTiming), nullptr, o.samples.threads);
+}
+
+int runPreview(PreviewOptions o) {
+  Settings settings = previewSettings(o);
+  for (const std::string& file : o.image.files()) {
+    checkWritable(file);
+    removeAbandoned(file);
+  }
+  const std::atomic<bool>& interrupted = installInterruptHandler();
+  std::atomic<bool> stop{false};
+  Audience audience(o, stop);
+
+  SceneData data = loadScene(o.scene);
+  const CameraData camera = chooseCamera(data, o.scene);
+  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene);
+  const auto integrators = makeIntegrators();
+  const Recipe recipe = planPreview(*scene, camera, settings, pointersTo(integrators), o, audience);
+  Session session(*scene, makePlan(*scene, camera, settings, pointersTo(integrators)));
+  session.identify(BRAID_VERSION, BRAID_BUILD_FLAGS, sceneIdentity(o.scene, scene->data()),
+                   planAttributes(*scene, session.plan(), scene->accel().isa()));
+  const std::string planText = session.plan().text() + recipeText(recipe);
+  if (o.scene.verbose) fmt::print(stderr, "{}", planText);
+  audience.board().setPlan(planText, o.image.combine.combine, static_cast<int>(session.plan().integrators.size()));
+  audience.board().setPhase(PreviewPhase::Rendering);
+
+  ProgressLine line(o.scene.quiet);
+  RenderResult result;
+  {
+    PreviewFeed feed(
+        o.image.combine, session, settings.threads,
+        [&](uint64_t spp, double seconds, const ImageViews& v) { audience.show(spp, seconds, v); },
+        [&](const std::string& text) { audience.warn(text); });
+    result = session.run(
+        [&](const Progress& p) {
+          feed.round(p);
+          audience.board().progress(p);
+          audience.passWarningsOn();
+          line.update(p);
+          return !stop;
+        },
+        &interrupted);
+  }
+  line.finish();
+  const bool cancelled = result.reason == StopReason::Cancelled && !stop;
+  const WrittenImage written = save(o, session, result, audience, cancelled);
+  const std::string reason = stop ? "the page" : cancelled ? "a signal" : toString(result.reason);
+  tellSaved(o, result, written, reason);
+  audience.board().end(reason, o.image.files());
+  audience.sayFarewell(interrupted);
+  return cancelled ? static_cast<int>(ExitCode::Interrupted) : 0;
+}
+
+}  // namespace
+
+void addPreview(CLI::App& app, Action& action) {
+  auto options = std::make_shared<PreviewOptions>();
+  PreviewOptions& o = *options;
+  o.scene.size = "640x360";
+  o.image.combine.combine = "auto";
+  CLI::App* command = app.add_subcommand("preview", "Watch a scene converge, in a browser or in tev");
+  command->footer(
+      "Without --spp and --time it goes on until it is stopped: by the button of the page, or by Ctrl-C.\n"
+      "Examples:\n"
+      "  braid preview scene.glb                                 (then open the address that it prints)\n"
+      "  braid preview scene.glb --http 8080 --size 1280x720 -o out.exr --png out.png\n"
+      "  braid preview scene.glb --http 0 --integrator pt,sppm --combine js@sppm --time 5m\n"
+      "  braid preview scene.glb --tev 127.0.0.1:14158\n"
+      "On another machine: ssh -L 8080:127.0.0.1:8080 HOST, then http://127.0.0.1:8080 here.");
+  addSceneOptions(*command, o.scene);
+  addSampleOptions(*command, o.samples);
+  addImageOptions(*command, o.image);
+  command
+      ->add_option("--http", o.port,
+                   fmt::format("Serve the page at this port of 127.0.0.1; 0: any that is free (default: {}, or any if "
+                               "that is taken; with --tev none)",
+                               kPort))
+      ->check(CLI::Range(0, 65535))
+      ->type_name("PORT");
+  command->add_option("--tev", o.tev, "Show the images in tev, which listens there")->type_name("HOST:PORT");
+  const CLI::Option* combine = command->get_option("--combine");
+  command->callback([options, combine, &action] {
+    options->combineGiven = combine->count() > 0;
+    action = [options] { return runPreview(*options); };
+  });
+}
+
+}  // namespace braid
