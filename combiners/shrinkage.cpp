@@ -105,7 +105,8 @@ Plane<double> factors(const Plane<double>& squares, const Plane<double>& varianc
 }
 
 // Pixels whose standard deviation is beyond 5 times that of their surroundings although X and Y differ by less than 4
-// of them: one sample carries them, and X says nothing that Y would contradict.
+// of them: one sample carries them, and X says nothing that Y would contradict. The surroundings' is the square of the
+// mean root, so that a dozen outliers in a window do not hide each other.
 std::vector<char> gated(const Rgb<float>& x, const Rgb<float>& variance, const Rgb<float>& y, int radius) {
   Plane<double> deviation(x.width(), x.height());
   forAll(x.size(), [&](size_t i) {
@@ -113,7 +114,10 @@ std::vector<char> gated(const Rgb<float>& x, const Rgb<float>& variance, const R
     for (size_t c = 0; c < 3; ++c) v += static_cast<double>(variance[c][i]) / 3;
     deviation[i] = std::sqrt(v);
   });
-  const Plane<double> around = mirrorBoxMean(deviation, radius);
+  Plane<double> roots(x.width(), x.height());
+  forAll(x.size(), [&](size_t i) { roots[i] = std::sqrt(deviation[i]); });
+  Plane<double> around = mirrorBoxMean(roots, radius);
+  forAll(x.size(), [&](size_t i) { around[i] *= around[i]; });
   std::vector<char> gate(x.size());
   forAll(x.size(), [&](size_t i) {
     double square = 0;

@@ -15,9 +15,10 @@ double PublicationSchedule::shareOfRun(const Progress& p, double least) const {
 
 PublicationSchedule::Due PublicationSchedule::due(const Progress& p) const {
   Due due;
-  if ((p.rounds > 0 && p.round >= p.rounds) || (p.secondsLeft >= 0 && p.secondsLeft < kSoon)) return due;
+  if (p.rounds > 0 && p.round >= p.rounds) return due;
+  const bool soonOver = p.secondsLeft >= 0 && p.secondsLeft < kSoon;
   const auto since = [&](double last) { return saveEvery_ > 0 && p.seconds - last >= saveEvery_; };
-  const bool mark = std::has_single_bit(p.round) || (checkSamples_ > 0 && p.round >= checkSamples_);
+  const bool mark = !soonOver && (std::has_single_bit(p.round) || (checkSamples_ > 0 && p.round >= checkSamples_));
   const bool plainPays = !any_ || plainSpent_ + plainCost_ <= kShare * p.seconds;
   const bool combinedPays =
       combines_ && any_ && combinedSpent_ <= kShare * p.seconds && combinedSpent_ + combinedCost_ <= shareOfRun(p, 0);

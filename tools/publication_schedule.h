@@ -18,7 +18,7 @@ class PublicationSchedule {
   // Of the time of a run, what combining may take, and as much what plain images and states after rounds 1, 2, 4, …
   // may take; what the clock asks for and the final images apart.
   static constexpr double kShare = 0.04;
-  // A run that ends so soon, in seconds, has its final images soon.
+  // A run that ends so soon, in seconds, has its final images soon: only the clock asks for more.
   static constexpr double kSoon = 1;
   // Runs without a limit count as at least so long when a combiner may take its share, in seconds.
   static constexpr double kLeastRun = 50;
