@@ -14,7 +14,7 @@ Rgb<float> meanOf(const std::vector<const Rgb<float>*>& images) {
   Rgb<float> out(images[0]->width(), images[0]->height());
   const auto count = static_cast<double>(images.size());
   for (size_t c = 0; c < 3; ++c)
-    parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         double sum = 0;
         for (const Rgb<float>* image : images) sum += static_cast<double>((*image)[c][i]);

@@ -12,7 +12,7 @@ namespace braid {
 template <class Map>
 Plane<float> channelMean(int width, int height, const Map& map) {
   Plane<float> out(width, height);
-  parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i)
       out[i] = finiteFloat((map(i, size_t(0)) + map(i, size_t(1)) + map(i, size_t(2))) / 3);
   });

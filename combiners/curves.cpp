@@ -91,7 +91,7 @@ Maps mapsOf(const MethodInputs& in, size_t points) {
 
 // 10⁻⁶ of the mean variance of a channel.
 double epsilonOf(const Plane<float>& variance) {
-  const double sum = parallelSum<double>(variance.size(), 4096, 0, [&](size_t begin, size_t end) {
+  const double sum = parallelSum<double>(variance.size(), kPixelChunk, 0, [&](size_t begin, size_t end) {
     double part = 0;
     for (size_t i = begin; i < end; ++i) part += static_cast<double>(variance[i]);
     return part;
@@ -104,7 +104,7 @@ Plane<float> weightsOf(const Maps& maps, size_t c, const MethodOptions& options,
   const double slope = std::clamp(options.number(kSlope), -2.0, -0.25), epsilon = epsilonOf(maps.variance[c]);
   const WeightLimits limits{std::max(0.0, options.number(kMost)), std::max(0.0, options.number(kMostRatio))};
   Plane<float> out(maps.variance.width(), maps.variance.height());
-  parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     std::vector<CurvePoint> curve(maps.history.size() + 1);
     for (size_t i = begin; i < end; ++i) {
       for (size_t k = 0; k < maps.history.size(); ++k)
@@ -140,7 +140,7 @@ MethodResult Curves::run(const MethodInputs& in) const {
   Plane<float> share(width, height);
   for (size_t c = 0; c < 3; ++c) {
     const Plane<float> weight = weightsOf(maps, c, in.options, points);
-    parallelChunks(weight.size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(weight.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         const double w = static_cast<double>(weight[i]), a = w / (maps.passes + w);
         const auto blend = [a](float x, float y) {

@@ -37,7 +37,7 @@ constexpr int kRadius = 6;  // of the filter of the biased image's variance
 // a + weight (b - a), not below 0.
 Rgb<float> blend(const Rgb<float>& a, const Rgb<float>& b, const Plane<float>& weight) {
   Rgb<float> out(a.width(), a.height());
-  parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t c = 0; c < 3; ++c)
       for (size_t i = begin; i < end; ++i) {
         const auto w = static_cast<double>(weight[i]);
@@ -50,7 +50,7 @@ Rgb<float> blend(const Rgb<float>& a, const Rgb<float>& b, const Plane<float>& w
 
 Plane<float> channelSum(const Rgb<float>& image, double scale) {
   Plane<float> out(image.width(), image.height());
-  parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i)
       out[i] = finiteFloat(scale * (static_cast<double>(image[0][i]) + static_cast<double>(image[1][i]) +
                                     static_cast<double>(image[2][i])));
@@ -141,7 +141,7 @@ struct Maps {
   Plane<float> toBiased, toPrior, variance;
   Maps(const Plane<float>& unbiasedError, const Plane<float>& biasedError, const Plane<float>& priorError)
       : toBiased(unbiasedError.width, unbiasedError.height), toPrior(toBiased), variance(toBiased) {
-    parallelChunks(toBiased.size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(toBiased.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         const double eta2 = priorError.empty() ? HUGE_VAL : static_cast<double>(priorError[i]);
         const DoubleShrinkage s =

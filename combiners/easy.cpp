@@ -50,7 +50,7 @@ MethodResult Easy::run(const MethodInputs& in) const {
   if (halves) result.image.half[0] = result.image.half[1] = Rgb<float>(width, height);
   result.error = Plane<float>(width, height);
   Plane<float> noisyShare(width, height);
-  parallelChunks(v.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(v.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i)
       for (size_t c = 0; c < 3; ++c) {
         const bool takeNoisy = error[c][i] > v[c][i];

@@ -159,7 +159,7 @@ WeightMaps ensembleWeights(const Estimate& unbiased, const std::vector<const Est
 Rgb<float> weightedImage(const WeightMaps& weights, const std::vector<const Rgb<float>*>& images) {
   Rgb<float> out(images[0]->width(), images[0]->height());
   for (size_t c = 0; c < 3; ++c)
-    parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         double sum = 0;
         for (size_t b = 0; b < images.size(); ++b)

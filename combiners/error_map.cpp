@@ -12,8 +12,6 @@ namespace braid {
 
 namespace {
 
-constexpr size_t kChunk = 4096;
-
 double squaredDifference(const Rgb<float>& a, const Rgb<float>& b, size_t i, size_t c) {
   const double d = static_cast<double>(a[c][i]) - static_cast<double>(b[c][i]);
   return d * d;
@@ -30,7 +28,7 @@ Rgb<float> meanVariance(const Estimate& e) {
   if (!e.variance.empty()) return e.variance;
   Rgb<float> out(e.mean.width(), e.mean.height());
   if (!hasHalves(e)) return out;
-  parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t c = 0; c < 3; ++c)
       for (size_t i = begin; i < end; ++i)
         out[c][i] = finiteFloat(0.25 * squaredDifference(e.half[0], e.half[1], i, c));
@@ -42,7 +40,7 @@ bool hasHalves(const Estimate& e) { return !e.half[0].empty() && !e.half[1].empt
 
 Rgb<float> halfVariance(const Estimate& x, const Rgb<float>& variance, int h) {
   Rgb<float> out(variance.width(), variance.height());
-  parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t c = 0; c < 3; ++c)
       for (size_t i = begin; i < end; ++i) {
         const double own = sqr(static_cast<double>(x.half[h][c][i]));
@@ -67,7 +65,7 @@ Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, c
   const Plane<float> samples = squaredErrorSamples(halves, unbiased, variance);
   const Plane<float> spread = varianceSamples(halves);
   Plane<double> unit(width, height), noise(width, height), bias(width, height);
-  parallelChunks(unit.size(), kChunk, [&](size_t begin, size_t end) {
+  parallelChunks(unit.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       double v = 0, level = 0;
       for (size_t c = 0; c < 3; ++c) {
@@ -82,7 +80,7 @@ Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, c
   noise = boxMean(noise, 1);
   bias = boxMean(bias, 7);
   Plane<float> out(width, height);
-  parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) out[i] = finiteFloat(unit[i] * (noise[i] + std::max(0.0, bias[i])));
   });
   return out;

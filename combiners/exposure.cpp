@@ -14,8 +14,7 @@ namespace {
 constexpr int kTile = 16;
 constexpr double kMiddleGrey = 0.18;
 constexpr double kDarkest = 1e-8;  // of the brightest tile
-constexpr size_t kChunk = 4096;
-constexpr float kLargest = 1e9f;  // of normalised colours and of features
+constexpr float kLargest = 1e9f;   // of normalised colours and of features
 
 double meanLuminance(const Rgb<float>& image, int x0, int y0, int x1, int y1) {
   double sum = 0;
@@ -31,7 +30,7 @@ double meanLuminance(const Rgb<float>& image, int x0, int y0, int x1, int y1) {
 
 // How many values were replaced.
 uint64_t clean(Plane<float>& plane, float lowest) {
-  return parallelSum<uint64_t>(plane.size(), kChunk, 0, [&](size_t begin, size_t end) {
+  return parallelSum<uint64_t>(plane.size(), kPixelChunk, 0, [&](size_t begin, size_t end) {
     uint64_t count = 0;
     for (size_t i = begin; i < end; ++i)
       if (!std::isfinite(plane[i]) || plane[i] < lowest) {
@@ -68,7 +67,7 @@ void cleanFeature(FeaturePlanes<P>& f, SanitiseReport& report) {
 // range stays at its end.
 void multiply(Plane<float>& plane, double k) {
   constexpr auto kEnd = static_cast<double>(std::numeric_limits<float>::max());
-  parallelChunks(plane.size(), kChunk, [&](size_t begin, size_t end) {
+  parallelChunks(plane.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i)
       plane[i] = static_cast<float>(std::clamp(static_cast<double>(plane[i]) * k, -kEnd, kEnd));
   });
@@ -78,7 +77,7 @@ void multiply(Rgb<float>& image, double k) {
 }
 
 uint64_t limit(Plane<float>& p, float largest) {
-  return parallelSum<uint64_t>(p.size(), kChunk, 0, [&](size_t begin, size_t end) {
+  return parallelSum<uint64_t>(p.size(), kPixelChunk, 0, [&](size_t begin, size_t end) {
     uint64_t count = 0;
     for (size_t i = begin; i < end; ++i)
       if (std::fabs(p[i]) > largest) {

@@ -20,7 +20,7 @@ constexpr int kRadius = 6;
 // Shares that sum to 1, proportional to the inverses of the errors.
 WeightMaps inverseErrorWeights(const std::vector<Plane<float>>& errors) {
   WeightMaps weights = uniformWeights(errors.size(), 1, errors[0].width, errors[0].height);
-  parallelChunks(errors[0].size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(errors[0].size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       double sum = 0;
       for (const Plane<float>& e : errors) sum += 1 / std::max(static_cast<double>(e[i]), 1e-30);
@@ -69,7 +69,7 @@ double squaredShare(const WeightMaps& weights, size_t k, size_t i) {
 Rgb<float> combinedVariance(const WeightMaps& weights, const Rgb<float>& variance,
                             const std::vector<Plane<float>>& errors) {
   Rgb<float> out(variance.width(), variance.height());
-  parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       double photons = 0;
       for (size_t k = 1; k < errors.size(); ++k)

@@ -45,7 +45,7 @@ Errors pixelErrors(const Estimate& x, const Estimate& y) {
 Plane<double> signedBoxMean(const Plane<double>& in, int radius) {
   Plane<double> part[2] = {{in.width, in.height}, {in.width, in.height}};
   const auto forAll = [&in](const auto& body) {
-    parallelChunks(in.size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(in.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) body(i);
     });
   };
@@ -83,7 +83,7 @@ MethodResult InverseVariance::run(const MethodInputs& in) const {
   out.mean = out.half[0] = out.half[1] = Rgb<float>(width, height);
   result.error = Plane<float>(width, height);
   Plane<float> weight(width, height);
-  parallelChunks(v.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(v.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const double vi = v[i], mi = std::max(0.0, m[i]);
       // Of two images without error the unbiased one.

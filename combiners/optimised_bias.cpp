@@ -12,10 +12,9 @@ namespace braid {
 namespace {
 
 constexpr float kEpsilon = 0.01f;  // of Eq. 10
-constexpr size_t kChunk = 4096;
 
 double halfDifference(const Estimate& e) {
-  const double sum = parallelSum(e.half[0].size(), kChunk, 0.0, [&](size_t begin, size_t end) {
+  const double sum = parallelSum(e.half[0].size(), kPixelChunk, 0.0, [&](size_t begin, size_t end) {
     double part = 0;
     for (size_t c = 0; c < 3; ++c)
       for (size_t i = begin; i < end; ++i) {

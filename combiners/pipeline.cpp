@@ -1,26 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "combiners/pipeline.h"
 
-#include <chrono>
 #include <set>
 
 #include <fmt/format.h>
 
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
+#include "renderer/core/stopwatch.h"
 
 namespace braid {
 
 namespace {
 
-double secondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 void addDifference(Rgb<float>& to, const Rgb<float>& a, const Rgb<float>& b) {
   if (to.empty()) return;
   for (size_t c = 0; c < 3; ++c)
-    parallelChunks(to[c].size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(to[c].size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) to[c][i] += a[c][i] - b[c][i];
     });
 }
@@ -146,13 +142,13 @@ void Runner::run(Step step) {
   PipelineOutput out;
   if (step.obstacle.empty()) step.obstacle = missingInput(step);
   if (step.obstacle.empty()) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch clock;
     try {
       out.result = step.method->run(inputsOf(step));
     } catch (const Error& e) {
       step.obstacle = e.what();
     }
-    out.seconds = secondsSince(start);
+    out.seconds = clock.seconds();
     out.inputSeconds = inputSeconds(step);
     const Estimate* unbiased = estimate(step.unbiased);
     Estimate& image = out.result.image;

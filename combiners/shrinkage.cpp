@@ -14,11 +14,10 @@ namespace {
 
 constexpr double kLeastSum = 1e-5;        // released code
 constexpr double kRelativeLeast = 1e-12;  // of a squared difference, relative to x²: below it is rounding
-constexpr size_t kChunk = 4096;
 
 template <class Body>
 void forAll(size_t count, const Body& body) {
-  parallelChunks(count, kChunk, [&](size_t begin, size_t end) {
+  parallelChunks(count, kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) body(i);
   });
 }
@@ -82,7 +81,7 @@ Plane<double> units(const Plane<float>& variance) {
 }
 
 double total(const Plane<double>& in) {
-  return parallelSum(in.size(), kChunk, 0.0, [&](size_t begin, size_t end) {
+  return parallelSum(in.size(), kPixelChunk, 0.0, [&](size_t begin, size_t end) {
     double sum = 0;
     for (size_t i = begin; i < end; ++i) sum += in[i];
     return sum;

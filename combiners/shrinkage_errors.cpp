@@ -21,7 +21,7 @@ double at(const Rgb<float>& image, size_t i, size_t c) { return static_cast<doub
 
 // error := max(error, scale (m² + offset)), m the channel mean of the image.
 void raise(Plane<float>& error, const Rgb<float>& image, double scale, double offset) {
-  parallelChunks(error.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(error.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const double m = (at(image, i, 0) + at(image, i, 1) + at(image, i, 2)) / 3;
       error[i] = finiteFloat(std::max(static_cast<double>(error[i]), scale * (m * m + offset)));

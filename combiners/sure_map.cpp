@@ -13,7 +13,6 @@ namespace braid {
 
 namespace {
 
-constexpr size_t kChunk = 4096;
 constexpr int kRadius = 5;
 constexpr double kTrimmed = 0.001;
 
@@ -27,13 +26,13 @@ double normalVariate(uint64_t seed, uint64_t item) {
 template <class Body>
 void forAllValues(const Rgb<float>& image, const Body& body) {
   for (size_t c = 0; c < 3; ++c)
-    parallelChunks(image.size(), kChunk, [&](size_t begin, size_t end) {
+    parallelChunks(image.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) body(c, i);
     });
 }
 
 double meanOf(const Plane<float>& plane) {
-  const double sum = parallelSum<double>(plane.size(), kChunk, 0, [&](size_t begin, size_t end) {
+  const double sum = parallelSum<double>(plane.size(), kPixelChunk, 0, [&](size_t begin, size_t end) {
     double part = 0;
     for (size_t i = begin; i < end; ++i) part += static_cast<double>(plane[i]);
     return part;
@@ -107,7 +106,7 @@ Rgb<float> gaussianFiltered(const Rgb<float>& in, double sigma) {
 void applySignRule(Rgb<float>& filtered, const Rgb<float>& unfiltered, const Rgb<float>& variance) {
   for (size_t c = 0; c < 3; ++c) {
     const bool helps = meanOf(variance[c]) > meanOf(unfiltered[c]);
-    parallelChunks(filtered[c].size(), kChunk, [&](size_t begin, size_t end) {
+    parallelChunks(filtered[c].size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i)
         filtered[c][i] = helps ? std::max(0.0f, filtered[c][i]) : std::fabs(filtered[c][i]);
     });

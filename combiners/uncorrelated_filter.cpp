@@ -22,7 +22,7 @@ constexpr size_t kCandidates = kUncorrelatedGammas.size();
 // a - b with mirrored pixels around it.
 Plane<float> paddedDifference(const Plane<float>& a, const Plane<float>& b) {
   Plane<float> out(a.width, a.height);
-  parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) out[i] = a[i] - b[i];
   });
   return mirrorPadded(out, kRadius);

@@ -114,7 +114,7 @@ void reconstruct(PassSamples& samples, const Plane<uint8_t>& background) {
       for (int x = 0; x < width; ++x) image.at(x, y) = samples.rightHandSide(c, x, y);
     });
     solveScreenedPoisson(image, kScreening);
-    parallelChunks(image.size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(image.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i)
         if (!background[i]) samples.base[c][i] = static_cast<float>(image[i]);
     });

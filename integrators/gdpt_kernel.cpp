@@ -119,7 +119,7 @@ bool GradientKernel::meet(Walker& walker, const RayHit& query, PathSample& sampl
     addEnvironment(walker.path, sample);
   } else {
     makeHit(scene_, query, walker.path.direction, walker.hit);
-    attenuate(walker.path, walker.hit.distance);
+    walker.path.throughput *= mediaTransmittance(scene_, walker.path.media, walker.hit.distance);
     if (context_.summaryOf(walker.hit).volume && crossNullInterface(walker.path, walker.hit)) {
       walker.arrival = Arrival::Nothing;
       goesOn = walker.path.nullCrossings < kMaxNullCrossings;
@@ -145,7 +145,7 @@ void GradientKernel::meetSurface(Walker& walker, PathSample& sample) {
     walker.surface.lobes = kLobeDiffuse;
     walker.surface.baseColor = baseColorAt(scene_, walker.hit);
   } else {
-    walker.surface = surfaceAt(scene_, walker.hit, material.lobes, indexOutside(walker.path, walker.hit));
+    walker.surface = surfaceAt(scene_, walker.hit, material.lobes, indexOutside(scene_, walker.path.media, walker.hit));
   }
   // Inside of a solid the far side of a connection may lie in another medium.
   walker.rough = walker.path.media.empty() && roughSurface(walker.surface);

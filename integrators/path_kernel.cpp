@@ -62,10 +62,8 @@ void PathKernel::addEmission(const PathState& path, const Hit& hit, PathSample& 
 // A solid's surface inside a solid that rules there scatters nothing: keeps the books of what the path is inside of and
 // goes on straight.
 bool PathKernel::crossNullInterface(PathState& path, const Hit& hit) const {
-  const uint32_t material = hit.mesh->material;
-  const int64_t other = path.media.ruling(scene_.materials(), hit.front ? -1 : static_cast<int64_t>(material));
-  if (other < 0 || !MediaStack::outranks(scene_.materials(), other, static_cast<int64_t>(material))) return false;
-  path.media.cross(material, hit.front);
+  if (!isNullInterface(scene_, path.media, hit)) return false;
+  path.media.cross(hit.mesh->material, hit.front);
   path.origin = offsetOrigin(hit, path.direction);
   path.featureDistance += hit.distance;
   path.lightCouldNotBeSampled = true;  // a shadow ray stops at the interface
@@ -82,20 +80,6 @@ void PathKernel::addUnlit(PathState& path, const Hit& hit, PathSample& sample) c
   sample.features.albedo = color;
   sample.features.normal = hit.frame.n;
   sample.features.depth = path.featureDistance + hit.distance;
-}
-
-void PathKernel::attenuate(PathState& path, float distance) const {
-  if (path.media.empty()) return;
-  const int64_t medium = path.media.ruling(scene_.materials());
-  if (medium >= 0) path.throughput *= volumeTransmittance(scene_.materials()[static_cast<size_t>(medium)], distance);
-}
-
-// Refractive index on the outside of a hit surface.
-float PathKernel::indexOutside(const PathState& path, const Hit& hit) const {
-  if (path.media.empty()) return 1;
-  const int64_t medium =
-      path.media.ruling(scene_.materials(), hit.front ? -1 : static_cast<int64_t>(hit.mesh->material));
-  return medium < 0 ? 1.0f : scene_.materials()[static_cast<size_t>(medium)].ior;
 }
 
 void PathKernel::recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsdf, PathSample& sample) const {
@@ -128,9 +112,7 @@ bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Bsdf& 
   if (!path.media.empty() || volume) {
     MediaStack media = path.media;
     if (!reflects && volume) media.cross(hit.mesh->material, hit.front);
-    const int64_t medium = media.ruling(scene_.materials());
-    if (medium >= 0)
-      shadow.contribution *= volumeTransmittance(scene_.materials()[static_cast<size_t>(medium)], light.distance);
+    shadow.contribution *= mediaTransmittance(scene_, media, light.distance);
   }
   return true;
 }
@@ -146,15 +128,7 @@ bool PathKernel::scatter(PathState& path, const Hit& hit, const Bsdf& bsdf, bool
   path.throughput *= sample.weight;
   if (isBlack(path.throughput)) return false;
 
-  if (sample.transmitted && hit.material->hasVolume()) {
-    const int64_t before = path.media.ruling(scene_.materials());
-    path.media.cross(hit.mesh->material, hit.front);
-    const int64_t after = path.media.ruling(scene_.materials());
-    const auto index = [&](int64_t m) {
-      return m < 0 ? 1.0f : std::max(scene_.materials()[static_cast<size_t>(m)].ior, 1e-3f);
-    };
-    path.etaScale *= sqr(index(before) / index(after));
-  }
+  if (sample.transmitted && hit.material->hasVolume()) path.etaScale *= sqr(crossInterface(scene_, path.media, hit));
   path.origin = offsetOrigin(hit, direction);
   path.direction = direction;
   path.lastPosition = hit.position;
@@ -283,7 +257,7 @@ bool PathKernel::shade(PathState& path, const RayHit& query, PathSample& sample,
   Hit hit;
   makeHit(scene_, query, path.direction, hit);
   if (observer_) observer_->onHit(hit);
-  attenuate(path, hit.distance);
+  path.throughput *= mediaTransmittance(scene_, path.media, hit.distance);
   const MaterialSummary& material = context_.summaryOf(hit);
   if (material.special()) {
     if (material.volume && crossNullInterface(path, hit)) return path.nullCrossings < kMaxNullCrossings;
@@ -295,8 +269,9 @@ bool PathKernel::shade(PathState& path, const RayHit& query, PathSample& sample,
   }
   const uint32_t lobes = material.lobes;
   const Vec3 wo = hit.frame.toLocal(hit.wo);
-  const Bsdf bsdf = lobes == kLobeDiffuse ? Bsdf(baseColorAt(scene_, hit), wo)
-                                          : Bsdf(surfaceAt(scene_, hit, lobes, indexOutside(path, hit)), wo);
+  const Bsdf bsdf = lobes == kLobeDiffuse
+                        ? Bsdf(baseColorAt(scene_, hit), wo)
+                        : Bsdf(surfaceAt(scene_, hit, lobes, indexOutside(scene_, path.media, hit)), wo);
   const bool firstNonSpecular = wantFeatures_ && !path.featuresDone;
   if (firstNonSpecular) recordFeatures(path, hit, bsdf, sample);
   if (path.segments >= plan_.settings.maxDepth) return false;

@@ -73,8 +73,6 @@ class PathKernel {
   void traceShadows();
   // One step of a path from a traced ray; true when it goes on. At most one shadow ray is appended.
   bool shade(PathState& path, const RayHit& query, PathSample& sample, ShadowRay& shadow, bool& hasShadow);
-  void attenuate(PathState& path, float distance) const;
-  float indexOutside(const PathState& path, const Hit& hit) const;
   void addEnvironment(const PathState& path, PathSample& sample) const;
   void addEmission(const PathState& path, const Hit& hit, PathSample& sample) const;
   void addUnlit(PathState& path, const Hit& hit, PathSample& sample) const;

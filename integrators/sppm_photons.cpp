@@ -45,7 +45,7 @@ bool tracePhotons(const TransportContext& context, const PhotonEmission& light, 
   std::atomic<uint64_t> segments{0};
   std::atomic<bool> cancelled{false};
   const int firstSegment = firstPhotonSegment(settings);
-  tbb::parallel_for(size_t(0), chunks, [&](size_t c) {
+  parallelFor(chunks, [&](size_t c) {
     if (cancel && cancel->load(std::memory_order_relaxed)) {
       cancelled = true;
       return;
@@ -64,7 +64,7 @@ bool tracePhotons(const TransportContext& context, const PhotonEmission& light, 
   if (cancelled) return false;
   for (size_t c = 0; c < chunks; ++c) offset[c + 1] = offset[c] + chunk[c].size();
   out.photons.resize(offset.back());
-  tbb::parallel_for(size_t(0), chunks, [&](size_t c) {
+  parallelFor(chunks, [&](size_t c) {
     std::copy(chunk[c].begin(), chunk[c].end(), out.photons.begin() + static_cast<std::ptrdiff_t>(offset[c]));
     std::vector<Photon>().swap(chunk[c]);
   });

@@ -5,12 +5,11 @@
 #include <memory>
 #include <utility>
 
-#include <tbb/task_arena.h>
-
 #include "integrators/light_preparation.h"
 #include "integrators/sppm_eye.h"
 #include "integrators/sppm_gather.h"
 #include "integrators/sppm_preparation.h"
+#include "renderer/core/parallel.h"
 
 namespace braid {
 
@@ -64,8 +63,7 @@ Gathering gatherFrame(const TransportContext& context, const Plan& plan, const P
 
 PhotonThroughput measurePhotonThroughput(const TransportContext& context, const Plan& plan) {
   PhotonThroughput result;
-  tbb::task_arena arena(1);
-  arena.execute([&] {
+  withThreads(1, [&] {
     const PhotonPreparation preparation(context, plan);
     if (plan.settings.maxDepth < 2 || preparation.emission().empty()) return;
     const PassSampler sampler(plan.settings.sampler, plan.settings.seed, kLightStream, 0);

@@ -2,9 +2,8 @@
 // Camera passes over fixed tiles: which pixels a tile holds never depends on the number of threads.
 #pragma once
 
-#include <tbb/parallel_for.h>
-
 #include "integrators/path_kernel.h"
+#include "renderer/core/parallel.h"
 
 namespace braid {
 
@@ -20,7 +19,8 @@ bool forEachTile(const PassRequest& request, const Render& render) {
   const int columns = (window.width() + kTile - 1) / kTile, rows = (window.height() + kTile - 1) / kTile;
   if (request.record) request.record->resize(static_cast<size_t>(columns) * static_cast<size_t>(rows));
   std::atomic<bool> cancelled{false};
-  tbb::parallel_for(0, columns * rows, [&](int i) {
+  parallelFor(static_cast<size_t>(columns) * static_cast<size_t>(rows), [&](size_t index) {
+    const int i = static_cast<int>(index);
     if (request.cancel && request.cancel->load(std::memory_order_relaxed)) {
       cancelled = true;
       return;
@@ -30,7 +30,7 @@ bool forEachTile(const PassRequest& request, const Render& render) {
     tile.y0 = window.y0 + (i / columns) * kTile;
     tile.x1 = std::min(tile.x0 + kTile, window.x1);
     tile.y1 = std::min(tile.y0 + kTile, window.y1);
-    const TileCounts counts = render(tile, request.record ? &(*request.record)[static_cast<size_t>(i)] : nullptr);
+    const TileCounts counts = render(tile, request.record ? &(*request.record)[index] : nullptr);
     if (request.statistics) {
       request.statistics->paths += counts.paths;
       request.statistics->rays += counts.rays;

@@ -10,8 +10,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <tbb/parallel_for.h>
-
 #include "integrators/bidirectional.h"
 #include "integrators/light_preparation.h"
 #include "integrators/registry.h"

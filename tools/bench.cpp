@@ -3,17 +3,16 @@
 // bare Embree calls; the ratio of the two rates, and the share of the render that Embree's part would take, mean the
 // same on every machine.
 #include <algorithm>
-#include <chrono>
 #include <fstream>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include "integrators/registry.h"
 #include "integrators/sppm_throughput.h"
 #include "renderer/core/hash.h"
+#include "renderer/core/parallel.h"
+#include "renderer/core/stopwatch.h"
 #include "tools/bench_combining.h"
 #include "tools/builtin_scenes.h"
 #include "tools/cli.h"
@@ -30,8 +29,6 @@ struct BenchOptions {
   int repeats = 5;
   bool json = false;
 };
-
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 double median(std::vector<double> v) {
   std::sort(v.begin(), v.end());
@@ -118,9 +115,9 @@ nlohmann::json benchPhotons(const TransportContext& context, const Plan& plan, i
 }
 
 nlohmann::json benchScene(const SceneSource& source, const BenchOptions& o, const Settings& settings) {
-  const double loadStart = now();
+  const Stopwatch loading;
   SceneData data = source.load();
-  const double loadSeconds = now() - loadStart;
+  const double loadSeconds = loading.seconds();
   const CameraData camera = chooseCamera(data, {});
   SceneOptions sceneOptions;
   sceneOptions.isa = o.isa == "auto" ? "" : o.isa;
@@ -132,8 +129,7 @@ nlohmann::json benchScene(const SceneSource& source, const BenchOptions& o, cons
 
   std::vector<double> renderRates, rawRates, ratios, pathRates, shares, incoherentRates, incoherentRatios;
   uint64_t rayCount = 0;
-  tbb::task_arena arena(settings.threads > 0 ? settings.threads : tbb::task_arena::automatic);
-  arena.execute([&] {
+  withThreads(settings.threads, [&] {
     PassTarget target(plan.window.width(), plan.window.height(), integrator.splats(), plan.features);
     Accumulator film(plan.window.width(), plan.window.height(), plan.buckets);
     std::vector<std::vector<RecordedRay>> recorded;
@@ -146,25 +142,25 @@ nlohmann::json benchScene(const SceneSource& source, const BenchOptions& o, cons
     // Each repeat times both, one after the other, so that a change of clock or load hits both alike.
     for (int repeat = 0; repeat < o.repeats; ++repeat) {
       PassStatistics statistics;
-      const double start = now();
+      const Stopwatch rendering;
       for (uint64_t k = 0; k < passes; ++k) {
         target.clear();
         integrator.renderPass({context, plan, film.passes(), nullptr, &statistics, nullptr}, target);
         film.commit(film.passes(), target);
       }
-      const double renderSeconds = now() - start;
+      const double renderSeconds = rendering.seconds();
       rayCount = (statistics.rays + statistics.shadowRays) / passes;
       const auto timeRaw = [&](const std::vector<std::vector<RecordedRay>>& tiles) {
-        const double rawStart = now();
-        tbb::parallel_for(size_t(0), tiles.size(), [&](size_t i) {
+        const Stopwatch tracing;
+        parallelFor(tiles.size(), [&](size_t i) {
           for (const RecordedRay& r : tiles[i]) traceRaw(scene.accel().handle(), r);
         });
-        return now() - rawStart;
+        return tracing.seconds();
       };
       const double rawSeconds = timeRaw(recorded), incoherentSeconds = timeRaw(shuffled);
-      const double embreeStart = now();
-      tbb::parallel_for(size_t(0), recorded.size(), [&](size_t i) { traceLikeRenderer(scene.accel(), recorded[i]); });
-      shares.push_back((now() - embreeStart) * static_cast<double>(passes) / renderSeconds);
+      const Stopwatch inEmbree;
+      parallelFor(recorded.size(), [&](size_t i) { traceLikeRenderer(scene.accel(), recorded[i]); });
+      shares.push_back(inEmbree.seconds() * static_cast<double>(passes) / renderSeconds);
       const double renderRate = static_cast<double>(statistics.rays + statistics.shadowRays) / renderSeconds;
       const double rawRate = static_cast<double>(recordedRays) / rawSeconds;
       renderRates.push_back(renderRate);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli.h"
 
-#include <chrono>
 #include <cstdio>
 
 #include <fmt/format.h>
 
 #include "renderer/core/error.h"
+#include "renderer/core/stopwatch.h"
 
 namespace braid {
 
@@ -139,7 +139,7 @@ void addSampleOptions(CLI::App& command, SampleChoice& c) {
 }
 
 SceneData loadScene(const SceneChoice& c, LoadTimes* times) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch clock;
   LoadOptions options = c.load;
   options.defaultLight = !c.noDefaultLight && c.environment.empty();
   options.keepAllAttributes = c.full;
@@ -161,7 +161,7 @@ SceneData loadScene(const SceneChoice& c, LoadTimes* times) {
   }
   for (Material& m : data.materials) m.emission *= scale;
   for (PunctualLight& l : data.lights) l.intensity *= scale;
-  if (times) times->load = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (times) times->load = clock.seconds();
   return data;
 }
 

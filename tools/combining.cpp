@@ -7,10 +7,10 @@
 #include <limits>
 
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include "combiners/registry.h"
 #include "renderer/core/error.h"
+#include "renderer/core/parallel.h"
 #include "renderer/film/error_map.h"
 #include "tools/cli.h"
 
@@ -119,8 +119,9 @@ std::string recipeText(const Recipe& recipe) {
 PipelineResult runCombining(const Estimates& estimates, const CombineChoice& choice, const PipelineOptions& options,
                             int threads) {
   if (choice.wanted().empty() && choice.denoisers.empty()) return {};
-  tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
-  return arena.execute([&] { return runPipeline(estimates, choice.wanted(), options); });
+  PipelineResult result;
+  withThreads(threads, [&] { result = runPipeline(estimates, choice.wanted(), options); });
+  return result;
 }
 
 void requireRunnable(const Recipe& recipe, const std::vector<std::string>& wanted) {

@@ -141,7 +141,7 @@ void varianceFromHalves(Estimate& e, const std::string& file, std::vector<std::s
   if (!e.variance.empty() || !complete(e.half)) return;
   e.variance = Rgb<float>(e.mean.width(), e.mean.height());
   for (size_t c = 0; c < 3; ++c)
-    parallelChunks(e.variance.size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(e.variance.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) e.variance[c][i] = 0.25f * sqr(e.half[0][c][i] - e.half[1][c][i]);
     });
   if (notes) notes->push_back(fmt::format("{}: no variance: taken from the difference of the halves", file));

@@ -89,7 +89,7 @@ Rgb<float> varianceOfMean(const ImageFile& file, const std::string& colour, cons
   Rgb<float> v = file.rgb(second ? moment : "Variance");
   const auto n = static_cast<double>(samples);
   for (size_t c = 0; c < 3; ++c)
-    parallelChunks(v.size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(v.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         const auto value = static_cast<double>(v[c][i]);
         const double spread = value - sqr(static_cast<double>(mean[c][i]));

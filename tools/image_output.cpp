@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/image_output.h"
 
-#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include "renderer/core/parallel.h"
+#include "renderer/core/stopwatch.h"
 #include "renderer/film/error_map.h"
 #include "tools/output_options.h"
 #include "tools/progress_line.h"
@@ -16,10 +15,6 @@
 namespace braid {
 
 namespace {
-
-double secondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 // The last wanted method that ran; null: none.
 const MethodResult* headlineOf(const PipelineResult& combined, const std::vector<std::string>& wanted) {
@@ -78,7 +73,7 @@ double relativeError(const Plane<float>& error, const Rgb<float>& image) {
       return *this;
     }
   };
-  const Sum sum = parallelSum(error.size(), 4096, Sum{}, [&](size_t begin, size_t end) {
+  const Sum sum = parallelSum(error.size(), kPixelChunk, Sum{}, [&](size_t begin, size_t end) {
     Sum s;
     for (size_t i = begin; i < end; ++i) {
       const double mean =
@@ -113,17 +108,16 @@ WrittenImage writeImage(const ImageOutput& o, Estimates estimates, const Plane<f
                         const std::atomic<bool>* cancel) {
   WrittenImage written;
   const std::vector<std::string> wanted = o.combine.wanted();
-  const auto combineStart = std::chrono::steady_clock::now();
+  const Stopwatch combining;
   const PipelineResult combined = runCombining(estimates, o.combine, o.combine.options(cancel), threads);
-  written.combineSeconds = secondsSince(combineStart);
+  written.combineSeconds = combining.seconds();
   if (cancel && cancel->load()) {
     written.cancelled = true;
     return written;
   }
-  tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
-  arena.execute([&] {
+  withThreads(threads, [&] {
     if (o.show) showImages(estimates, combined, wanted, o.show);
-    const auto writeStart = std::chrono::steady_clock::now();
+    const Stopwatch writing;
     written.error = headlineError(combined, wanted, estimates);
     const Rgb<float> first = estimates.estimates.front().mean;
     const CombinedLayers layers(combined, wanted, o.combine.weights, !o.noTiming, estimates);
@@ -144,7 +138,7 @@ WrittenImage writeImage(const ImageOutput& o, Estimates estimates, const Plane<f
                         report.clampedToHalf));
     }
     if (!o.png.empty()) writePng(o.png, headline, static_cast<float>(o.exposure));
-    written.writeSeconds = secondsSince(writeStart);
+    written.writeSeconds = writing.seconds();
   });
   for (const PipelineOutput& out : combined.outputs)
     if (out.ran())

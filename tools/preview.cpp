@@ -8,6 +8,7 @@
 
 #include "integrators/registry.h"
 #include "renderer/core/error.h"
+#include "renderer/core/stopwatch.h"
 #include "renderer/film/output_file.h"
 #include "tools/cli.h"
 #include "tools/combining.h"
@@ -82,9 +83,8 @@ class Audience {
 
   // Gives pages the time to fetch the last images.
   void sayFarewell(const std::atomic<bool>& interrupted) const {
-    const auto start = std::chrono::steady_clock::now();
-    while (server_ && server_->watched(kWatchedWithin) && !interrupted &&
-           std::chrono::steady_clock::now() - start < std::chrono::duration<double>(kFarewell))
+    const Stopwatch clock;
+    while (server_ && server_->watched(kWatchedWithin) && !interrupted && clock.seconds() < kFarewell)
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
 

@@ -2,19 +2,15 @@
 #include "tools/preview_feed.h"
 
 #include <algorithm>
-#include <chrono>
 #include <exception>
 #include <utility>
 
-#include <tbb/info.h>
+#include "renderer/core/parallel.h"
+#include "renderer/core/stopwatch.h"
 
 namespace braid {
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 uint64_t samplesOf(const Estimates& e) { return e.estimates.front().passes; }
 
@@ -26,7 +22,7 @@ PreviewFeed::PreviewFeed(CombineChoice combine, const Session& session, int thre
       session_(session),
       show_(std::move(show)),
       warn_(std::move(warn)) {
-  helpers_ = std::max(1, (threads > 0 ? threads : tbb::info::default_concurrency()) / 4);
+  helpers_ = std::max(1, (threads > 0 ? threads : machineThreads()) / 4);
 }
 
 PreviewFeed::~PreviewFeed() {
@@ -49,9 +45,9 @@ void PreviewFeed::round(const Progress& p) {
   collect(noisyJob_);
   collect(combineJob_);
   if (p.seconds < nextNoisy_ || noisyJob_.running()) return;
-  const Clock::time_point start = Clock::now();
+  const Stopwatch clock;
   const Snapshot snapshot = session_.snapshot();
-  nextNoisy_ = p.seconds + std::max(kInterval, secondsSince(start) / kHeldUpShare);
+  nextNoisy_ = p.seconds + std::max(kInterval, clock.seconds() / kHeldUpShare);
   showNoisy(snapshot, p.seconds);
   const double pause = combineTook_ / kCombiningShare;
   // With one sample there is nothing yet that a method could tell noise from.
@@ -69,9 +65,9 @@ void PreviewFeed::showNoisy(const Snapshot& snapshot, double seconds) {
 void PreviewFeed::combine(const Snapshot& snapshot, double seconds) {
   combineBegan_ = seconds;
   combineJob_.start([this, snapshot, seconds] {
-    const Clock::time_point start = Clock::now();
+    const Stopwatch clock;
     const PipelineResult result = runCombining(*snapshot, choice_, choice_.options(&cancel_), helpers_);
-    combineTook_ = secondsSince(start);
+    combineTook_ = clock.seconds();
     if (cancel_) return;
     showImages(*snapshot, result, choice_.wanted(), [&](ImageViews v) {
       // By now there are newer noisy ones.

@@ -2,27 +2,18 @@
 #include "tools/publisher.h"
 
 #include <algorithm>
-#include <chrono>
 #include <memory>
 #include <utility>
 
-#include <tbb/info.h>
-
 #include "renderer/core/error.h"
+#include "renderer/core/parallel.h"
+#include "renderer/core/stopwatch.h"
 #include "renderer/film/state_file.h"
 #include "tools/header.h"
 
 namespace braid {
 
 namespace {
-
-class Clock {
- public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 uint64_t samplesOf(const FilmState& state) { return state.estimates.front().sums.passes(); }
 
@@ -58,7 +49,7 @@ Publisher::Publisher(PublishOptions options, const Session& session)
       combines_(!options_.image.combine.wanted().empty() || !options_.image.combine.denoisers.empty()),
       session_(session),
       schedule_(options_.saveEvery, options_.targetError, combines_) {
-  const int threads = options_.threads > 0 ? options_.threads : tbb::info::default_concurrency();
+  const int threads = options_.threads > 0 ? options_.threads : machineThreads();
   helpers_ = std::max(1, threads / 4);
   machineShare_ = static_cast<double>(helpers_) / threads;
 }
@@ -108,7 +99,7 @@ void Publisher::collect(std::vector<Publication>& news) {
 }
 
 void Publisher::saveState(const Progress& p, std::vector<Publication>& news) {
-  const Clock clock;
+  const Stopwatch clock;
   saving_ = {samplesOf(session_.state()), p.seconds, false, {}, {}};
   try {
     std::shared_ptr<OutputFile> file = beginStateFile(options_.checkpoint, session_.state());
@@ -120,7 +111,7 @@ void Publisher::saveState(const Progress& p, std::vector<Publication>& news) {
 }
 
 void Publisher::publishImage(const Progress& p, bool combined) {
-  const Clock clock;
+  const Stopwatch clock;
   cancel_ = false;
   pending_ = {samplesOf(session_.state()), p.seconds, combined, {}, {}};
   auto output = std::make_shared<ImageOutput>(options_.image);
@@ -131,9 +122,9 @@ void Publisher::publishImage(const Progress& p, bool combined) {
   auto shown = std::make_shared<Estimates>(describedEstimates(session_, !options_.image.noTiming));
   const auto alpha = std::make_shared<std::optional<Plane<float>>>(session_.alpha());
   heldUp_ = clock.seconds();
-  jobStart_ = std::chrono::steady_clock::now();
+  jobClock_.restart();
   imageJob_.start([this, output, shown, alpha] {
-    const Clock job;
+    const Stopwatch job;
     try {
       pending_.image = writeImage(*output, std::move(*shown), *alpha ? &**alpha : nullptr, helpers_, &cancel_);
     } catch (...) {
@@ -146,8 +137,7 @@ void Publisher::publishImage(const Progress& p, bool combined) {
 
 void Publisher::giveUpIfTooLong(const Progress& p) {
   if (!imageJob_.running() || !pending_.combined) return;
-  const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - jobStart_).count();
-  if (schedule_.tooLong(p, heldUp_ + took * machineShare_)) cancel_ = true;
+  if (schedule_.tooLong(p, heldUp_ + jobClock_.seconds() * machineShare_)) cancel_ = true;
 }
 
 std::vector<Publication> Publisher::round(const Progress& p) {

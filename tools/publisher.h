@@ -5,7 +5,6 @@
 #pragma once
 
 #include <atomic>
-#include <chrono>
 #include <exception>
 #include <functional>
 #include <set>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "renderer/session/session.h"
+#include "renderer/core/stopwatch.h"
 #include "tools/image_output.h"
 #include "tools/publication_schedule.h"
 
@@ -91,7 +91,7 @@ class Publisher {
   Publication pending_, saving_;
   double heldUp_ = 0;  // seconds for which the pending publication stopped the pass loop
   double took_ = 0;    // seconds of the job beside it
-  std::chrono::steady_clock::time_point jobStart_;
+  Stopwatch jobClock_;
   std::set<std::string> told_;
   BackgroundJob imageJob_, stateJob_;
 };

@@ -12,8 +12,6 @@ namespace braid {
 
 namespace {
 
-constexpr size_t kChunk = 4096;
-
 struct Sum {
   double value = 0;
   uint64_t count = 0, invalid = 0;
@@ -27,7 +25,7 @@ double at(const Rgb<float>& image, size_t c, size_t i) { return static_cast<doub
 template <class Product>
 double relativeMean(const ReferenceImage& reference, const Rgb<float>& image, const Product& product) {
   const Rgb<float>&a = reference.half[0], &b = reference.half[1];
-  const Sum sum = parallelSum(image.size(), kChunk, Sum{}, [&](size_t begin, size_t end) {
+  const Sum sum = parallelSum(image.size(), kPixelChunk, Sum{}, [&](size_t begin, size_t end) {
     Sum s;
     for (size_t i = begin; i < end; ++i) {
       if (!isFinite(a.pixel(i)) || !isFinite(b.pixel(i))) continue;
@@ -71,7 +69,7 @@ Dominance dominance(const Rgb<float>& image, const Rgb<float>& baseline, const R
     double difference = 0, better = 0, count = 0;
     void operator+=(const Total& t) { difference += t.difference, better += t.better, count += t.count; }
   };
-  const Total total = parallelSum(image.size(), kChunk, Total{}, [&](size_t begin, size_t end) {
+  const Total total = parallelSum(image.size(), kPixelChunk, Total{}, [&](size_t begin, size_t end) {
     Total t;
     for (size_t i = begin; i < end; ++i) {
       if (!isFinite(reference.pixel(i))) continue;

@@ -26,11 +26,11 @@ void SweepProgress::begin(const std::string& what, double passes, double seconds
   passesExpected_ = std::max(0.0, passesExpected_ - passes);
   secondsExpected_ = std::max(0.0, secondsExpected_ - seconds);
   passesNow_ = secondsNow_ = 0;
-  begun_ = Clock::now();
+  begun_.restart();
 }
 
 double SweepProgress::secondsLeft() const {
-  const double passes = passesDone_ + passesNow_, time = passesTime_ + (passesNow_ > 0 ? elapsed() : 0);
+  const double passes = passesDone_ + passesNow_, time = passesTime_ + (passesNow_ > 0 ? begun_.seconds() : 0);
   const double passesLeft = passesExpected_ + passesBegun_ - passesNow_;
   if (passesLeft > 0 && passes <= 0) return -1;
   const double each = passes > 0 ? time / passes : 0;
@@ -40,7 +40,7 @@ double SweepProgress::secondsLeft() const {
 void SweepProgress::update(double passes, double seconds, const std::string& detail) {
   passesNow_ = std::min(passes, passesBegun_);
   secondsNow_ = std::min(seconds, secondsBegun_);
-  const double now = std::chrono::duration<double>(Clock::now() - start_).count();
+  const double now = whole_.seconds();
   if (quiet_ || now - lastPrinted_ < interval_) return;
   lastPrinted_ = now;
   // A log of a night's sweep should not have thousands of lines.
@@ -54,7 +54,7 @@ void SweepProgress::update(double passes, double seconds, const std::string& det
 void SweepProgress::end() {
   if (passesBegun_ > 0) {
     passesDone_ += passesNow_;
-    passesTime_ += elapsed();
+    passesTime_ += begun_.seconds();
   }
   passesBegun_ = secondsBegun_ = passesNow_ = secondsNow_ = 0;
 }

@@ -2,8 +2,9 @@
 // Progress of many renders on standard error, with the time left of all of them.
 #pragma once
 
-#include <chrono>
 #include <string>
+
+#include "renderer/core/stopwatch.h"
 
 namespace braid {
 
@@ -26,9 +27,6 @@ class SweepProgress {
   void breakLine();
 
  private:
-  using Clock = std::chrono::steady_clock;
-  double elapsed() const { return std::chrono::duration<double>(Clock::now() - begun_).count(); }
-
   bool quiet_, terminal_, open_ = false;
   double interval_, lastPrinted_ = -1e9;
   std::string what_;
@@ -36,7 +34,7 @@ class SweepProgress {
   double passesBegun_ = 0, secondsBegun_ = 0;        // the render begun
   double passesNow_ = 0, secondsNow_ = 0;            // done of it
   double passesDone_ = 0, passesTime_ = 0;           // passes of ended renders and the wall time that they took
-  Clock::time_point start_ = Clock::now(), begun_ = Clock::now();
+  Stopwatch whole_, begun_;
 };
 
 }  // namespace braid

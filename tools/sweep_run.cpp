@@ -2,12 +2,12 @@
 #include "tools/sweep_run.h"
 
 #include <algorithm>
-#include <chrono>
 #include <limits>
 
 #include <fmt/format.h>
 
 #include "renderer/core/error.h"
+#include "renderer/core/stopwatch.h"
 
 namespace braid {
 
@@ -16,13 +16,12 @@ namespace {
 // Wall-clock time without the stretches between pause() and resume().
 class RenderClock {
  public:
-  void pause() { total_ += std::chrono::duration<double>(Clock::now() - start_).count(); }
-  void resume() { start_ = Clock::now(); }
+  void pause() { total_ += stretch_.seconds(); }
+  void resume() { stretch_.restart(); }
   double seconds() const { return total_; }
 
  private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point start_ = Clock::now();
+  Stopwatch stretch_;
   double total_ = 0;
 };
 

@@ -94,7 +94,8 @@ struct TevClient::Mailbox {
 // The thread's side: a connection, and what went through it.
 class TevClient::Sender {
  public:
-  Sender(std::shared_ptr<Mailbox> mailbox, Address address) : box_(std::move(mailbox)), address_(std::move(address)) {}
+  Sender(std::shared_ptr<Mailbox> mailbox, std::string host, std::string port)
+      : box_(std::move(mailbox)), host_(std::move(host)), port_(std::move(port)) {}
   ~Sender() { disconnect(); }
 
   void run() {
@@ -144,8 +145,8 @@ class TevClient::Sender {
     retryAt_ = Clock::now() + kRetry;
     const std::lock_guard lock(box_->mutex);
     if (!std::exchange(box_->warned, true))
-      box_->warning = fmt::format("--tev {}:{}: {}: no images are shown there until the viewer can be reached",
-                                  address_.host, address_.port, reason_.empty() ? reason : reason_);
+      box_->warning = fmt::format("--tev {}:{}: {}: no images are shown there until the viewer can be reached", host_,
+                                  port_, reason_.empty() ? reason : reason_);
   }
 
   void disconnect() {
@@ -173,7 +174,7 @@ class TevClient::Sender {
     reason_.clear();
     addrinfo hints{}, *found = nullptr;
     hints.ai_socktype = SOCK_STREAM;
-    const int failure = getaddrinfo(address_.host.c_str(), address_.port.c_str(), &hints, &found);
+    const int failure = getaddrinfo(host_.c_str(), port_.c_str(), &hints, &found);
     if (failure != 0) {
       reason_ = gai_strerror(failure);
       return false;
@@ -234,7 +235,7 @@ class TevClient::Sender {
   }
 
   const std::shared_ptr<Mailbox> box_;
-  const Address address_;
+  const std::string host_, port_;
   int socket_ = -1;
   bool lost_ = false;  // the last attempt failed
   Clock::time_point retryAt_;
@@ -243,7 +244,7 @@ class TevClient::Sender {
 };
 
 TevClient::TevClient(const std::string& address) : mailbox_(std::make_shared<Mailbox>()) {
-  thread_ = std::thread([box = mailbox_, to = parseAddress(address)] { Sender(box, to).run(); });
+  thread_ = std::thread([box = mailbox_, to = parseAddress(address)] { Sender(box, to.host, to.port).run(); });
 }
 
 TevClient::~TevClient() {

@@ -14,7 +14,7 @@ Rgb<float> boxFiltered(const Rgb<float>& in, int radius) {
   Rgb<float> out(in.width(), in.height());
   for (size_t c = 0; c < 3; ++c) {
     const Plane<double> mean = boxMean(in[c], radius);
-    parallelChunks(mean.size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(mean.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) out[c][i] = static_cast<float>(mean[i]);
     });
   }

@@ -14,7 +14,6 @@ namespace {
 
 constexpr float kSensitivity = 0.5f;
 constexpr int kPatch = 3, kCrossWindow = 5, kMeanWindow = 2;
-constexpr size_t kChunk = 4096;
 
 // One channel before filtering. The variance is that of the mean.
 struct RawChannel {
@@ -24,7 +23,7 @@ struct RawChannel {
 template <class Value>
 Plane<float> planeOf(int width, int height, const Value& value) {
   Plane<float> out(width, height);
-  parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const float v = value(i);
       out[i] = std::isfinite(v) ? v : 0.0f;

@@ -17,7 +17,6 @@ namespace braid {
 
 namespace {
 
-constexpr size_t kChunk = 4096;
 constexpr int kWindow = 9, kPatch = 3;        // of the regressions
 constexpr int kMapWindow = 9, kMapPatch = 1;  // of error and selection maps
 constexpr int kVarianceWindow = 5, kVariancePatch = 1;
@@ -30,7 +29,7 @@ constexpr float kLeastDivisor = 0.2f;     // added to the albedo
 template <class Value>
 Rgb<float> imageOf(int width, int height, const Value& value) {
   Rgb<float> out(width, height);
-  parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t c = 0; c < 3; ++c)
       for (size_t i = begin; i < end; ++i) {
         const float v = value(c, i);

@@ -47,7 +47,7 @@ bool findAll(void* library, OidnApi& api) {
 
 std::vector<float> interleaved(const Rgb<float>& planes, float lo, float hi) {
   std::vector<float> out(3 * planes.size());
-  parallelChunks(planes.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(planes.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i)
       for (size_t c = 0; c < 3; ++c) out[3 * i + c] = std::clamp(planes[c][i], lo, hi);
   });

@@ -13,7 +13,6 @@ namespace braid {
 
 namespace {
 
-constexpr size_t kChunk = 4096;
 constexpr float kLargest = 1e9f;
 constexpr float kMinAlbedo = 0.03f;
 constexpr int kRescaleRadius = 10;
@@ -45,7 +44,7 @@ struct Colour {
 Rgb<float> weightedSum(const std::vector<Rgb<float>>& images, const std::vector<float>& shares) {
   Rgb<float> out(images[0].width(), images[0].height());
   for (size_t c = 0; c < 3; ++c)
-    parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
+    parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t k = 0; k < images.size(); ++k)
         for (size_t i = begin; i < end; ++i) out[c][i] += shares[k] * images[k][c][i];
     });
@@ -65,7 +64,7 @@ bool addUp(const Colour& colour) {
 Rgb<float> prepared(const Rgb<float>& image, const Rgb<float>& divisor) {
   Rgb<float> out = image;
   for (size_t c = 0; c < 3; ++c)
-    parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
+    parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) out[c][i] = finiteOrZero(out[c][i]) / divisor[c][i];
     });
   return out;
@@ -139,7 +138,7 @@ Selection selectionOf(const RdfcGuide& colour, const std::vector<RdfcCandidate>&
   for (size_t i = 0; i < binary[0].size(); ++i) binary[bestCandidate(candidates, s.risk, i)][i] = 1;
   for (size_t k = 0; k < binary.size(); ++k) planes[k] = &binary[k];
   s.share = filteredAlong(colour, 5, planes, cancel);
-  parallelChunks(binary[0].size(), kChunk, [&](size_t begin, size_t end) {
+  parallelChunks(binary[0].size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       float sum = 0;
       for (const Plane<float>& share : s.share) sum += share[i];
@@ -154,7 +153,7 @@ std::vector<Rgb<float>> blended(const std::vector<RdfcCandidate>& candidates, co
   std::vector<Rgb<float>> out(candidates[0].images.size(), Rgb<float>(share[0].width, share[0].height));
   for (size_t image = 0; image < out.size(); ++image)
     for (size_t c = 0; c < 3; ++c)
-      parallelChunks(share[0].size(), kChunk, [&](size_t begin, size_t end) {
+      parallelChunks(share[0].size(), kPixelChunk, [&](size_t begin, size_t end) {
         for (size_t k = 0; k < candidates.size(); ++k)
           for (size_t i = begin; i < end; ++i) out[image][c][i] += share[k][i] * candidates[k].images[image][c][i];
       });
@@ -186,7 +185,7 @@ std::vector<Rgb<float>> secondPass(const std::vector<Rgb<float>>& images, const 
 
 Plane<float> blendedRisk(const Selection& s, const Rgb<float>& divisor) {
   Plane<float> out(divisor.width(), divisor.height());
-  parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       float risk = 0, scale = 0;
       for (size_t k = 0; k < s.risk.size(); ++k) risk += s.share[k][i] * s.risk[k][i];
@@ -239,7 +238,7 @@ RdfcResult rdfcDenoised(const Estimate& estimate, const Features* features, cons
 
   for (Rgb<float>& image : images)
     for (size_t c = 0; c < 3; ++c)
-      parallelChunks(image.size(), kChunk, [&](size_t begin, size_t end) {
+      parallelChunks(image.size(), kPixelChunk, [&](size_t begin, size_t end) {
         for (size_t i = begin; i < end; ++i) image[c][i] *= colour.divisor[c][i];
       });
   RdfcResult result;

@@ -5,35 +5,52 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <functional>
 #include <vector>
-
-#include <tbb/parallel_for.h>
 
 namespace braid {
 
-// Calls body(begin, end) for consecutive chunks of `chunk` items of [0, count). Chunks run in any order on any thread.
+// Pixels of a chunk in loops over images: long against the cost of a task, short enough for a core's cache.
+constexpr size_t kPixelChunk = 4096;
+
+// Calls task(body, i) for all i < count. Every loop below goes through it: the thread library is known to one file.
+void parallelTasks(size_t count, const void* body, void (*task)(const void* body, size_t index));
+
+// Calls body(i) for all i < count, in any order on any thread; the first exception that is thrown ends it.
+template <class Body>
+void parallelFor(size_t count, const Body& body) {
+  parallelTasks(count, &body, [](const void* b, size_t i) { (*static_cast<const Body*>(b))(i); });
+}
+
+// Calls body(begin, end) for consecutive chunks of `chunk` items of [0, count).
 template <class Body>
 void parallelChunks(size_t count, size_t chunk, const Body& body) {
-  const size_t chunks = (count + chunk - 1) / chunk;
-  tbb::parallel_for(size_t(0), chunks, [&](size_t c) { body(c * chunk, std::min(count, (c + 1) * chunk)); });
+  parallelFor((count + chunk - 1) / chunk, [&](size_t c) { body(c * chunk, std::min(count, (c + 1) * chunk)); });
 }
 
 // Calls body(y) for every row of an image.
 template <class Body>
 void parallelRows(int height, const Body& body) {
-  tbb::parallel_for(0, height, body);
+  parallelFor(static_cast<size_t>(std::max(0, height)), [&](size_t y) { body(static_cast<int>(y)); });
 }
 
 // Sums map(begin, end) over fixed chunks, added in chunk order: the same bits for any number of threads.
 template <class T, class Map>
 T parallelSum(size_t count, size_t chunk, T zero, const Map& map) {
-  const size_t chunks = (count + chunk - 1) / chunk;
-  std::vector<T> partial(chunks, zero);
-  tbb::parallel_for(size_t(0), chunks,
-                    [&](size_t c) { partial[c] = map(c * chunk, std::min(count, (c + 1) * chunk)); });
+  std::vector<T> partial((count + chunk - 1) / chunk, zero);
+  parallelFor(partial.size(), [&](size_t c) { partial[c] = map(c * chunk, std::min(count, (c + 1) * chunk)); });
   T total = zero;
   for (const T& p : partial) total += p;
   return total;
 }
+
+// Both at once.
+void parallelBoth(const std::function<void()>& one, const std::function<void()>& other);
+
+// Runs the task, and the loops in it, on at most so many threads; 0: as many as the machine has.
+void withThreads(int threads, const std::function<void()>& task);
+
+// Threads that the machine runs at once.
+int machineThreads();
 
 }  // namespace braid

@@ -5,11 +5,15 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "renderer/core/vec.h"
 
 namespace braid {
+
+// What a file may ask for at most: beyond it lies an error in the file more likely than an image.
+constexpr int64_t kMaxPixels = int64_t(1) << 28;
 
 template <class T>
 struct Plane {

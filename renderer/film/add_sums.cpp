@@ -10,7 +10,7 @@ namespace {
 
 void addPlane(Plane<double>& to, const Plane<double>& from) {
   BRAID_ASSERT(to.width == from.width && to.height == from.height);
-  parallelChunks(to.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(to.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) to[i] += from[i];
   });
 }

@@ -11,7 +11,6 @@ namespace braid {
 namespace {
 
 constexpr int kRadius = 6;  // 13 x 13 pixels
-constexpr size_t kChunk = 4096;
 
 }  // namespace
 
@@ -23,7 +22,7 @@ Plane<float> squaredBias(const Estimate& e) {
   for (size_t c = 0; c < 3; ++c) {
     for (size_t i = 0; i < square.size(); ++i) square[i] = sqr(static_cast<double>(e.bias[c][i]));
     const Plane<double> squares = boxSum(square, kRadius), noise = boxSum(e.biasVariance[c], kRadius);
-    parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
+    parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i)
         out[i] += static_cast<float>(std::max(0.0, squares[i] - noise[i]) / (3 * pixels[i]));
     });

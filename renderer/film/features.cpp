@@ -15,7 +15,7 @@ using Planes = std::vector<Plane<double>>;
 Plane<float> ratio(const Plane<double>& a, const Plane<double>* b, uint64_t n) {
   Plane<float> out(a.width, a.height);
   if (n == 0) return out;
-  parallelChunks(a.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(a.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i)
       out[i] = static_cast<float>((a[i] + (b ? (*b)[i] : 0.0)) / static_cast<double>(n));
   });
@@ -79,7 +79,7 @@ Plane<float> FeatureAccumulator::variance(int component) const {
   const auto c = static_cast<size_t>(component);
   const Plane<double>& a = sum_[0][c];
   Plane<float> out(a.width, a.height);
-  parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i)
       out[i] = static_cast<float>(varianceOfMean(a[i] + sum_[1][c][i], sumsq_[c][i], passes()));
   });
@@ -88,7 +88,7 @@ Plane<float> FeatureAccumulator::variance(int component) const {
 
 void CoverageAccumulator::commit(const PassTarget& target) {
   BRAID_ASSERT(target.wantsCoverage() && target.width_ == sum_.width && target.height_ == sum_.height);
-  parallelChunks(sum_.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(sum_.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) sum_[i] += static_cast<double>(target.coverage_[i]);
   });
   ++count_;

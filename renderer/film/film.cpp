@@ -202,7 +202,7 @@ Rgb<float> Accumulator::biasMean() const {
   Rgb<float> out(biasSum_.width(), biasSum_.height());
   const double scale = passes() > 0 ? 1 / static_cast<double>(passes()) : 0.0;
   for (size_t c = 0; c < 3; ++c)
-    parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) out[c][i] = static_cast<float>(biasSum_[c][i] * scale);
     });
   return out;
@@ -211,7 +211,7 @@ Rgb<float> Accumulator::biasMean() const {
 Rgb<float> Accumulator::biasVariance() const {
   Rgb<float> out(biasSum_.width(), biasSum_.height());
   for (size_t c = 0; c < 3; ++c)
-    parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i)
         out[c][i] = static_cast<float>(varianceOfMean(biasSum_[c][i], biasSumsq_[c][i], passes()));
     });
@@ -306,7 +306,7 @@ Rgb<float> Accumulator::variance(bool lowDiscrepancy) const {
     // differences of running sums, so that a zero box is exactly zero and nothing absolute has to guard the division.
     const Plane<double> between = boxSum(bucketVariance(c), kVarianceBoxRadius);
     const Plane<double> within = boxSum(out[c], kVarianceBoxRadius);
-    parallelChunks(out[c].size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(out[c].size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         const double ratio = within[i] > 0 ? std::min(between[i] / within[i], ratioLimit) : 0.0;
         out[c][i] = static_cast<float>(static_cast<double>(out[c][i]) * ratio);

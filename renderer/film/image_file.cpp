@@ -12,6 +12,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
+#include "renderer/core/plane.h"
 #include "renderer/film/exr.h"
 #include "renderer/film/srgb.h"
 
@@ -21,7 +22,6 @@ namespace {
 
 // What a file may declare before anything is allocated for it: 16k x 16k pixels, the channels of a large multilayer
 // file, 16 GiB in all.
-constexpr int64_t kMaxPixels = int64_t(1) << 28;
 constexpr int kMaxChannels = 4096;
 constexpr int64_t kMaxValues = int64_t(1) << 32;
 constexpr int kRowsPerRead = 64;
@@ -110,7 +110,7 @@ void linearise(const OIIO::ImageSpec& spec, std::vector<Plane<float>>& planes) {
   const Plane<float>* alpha = hasAlpha ? &planes[static_cast<size_t>(spec.alpha_channel)] : nullptr;
   for (Plane<float>& p : planes) {
     if (&p == alpha) continue;
-    parallelChunks(p.size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(p.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) p[i] = decodeSrgb(p[i]) * (alpha ? (*alpha)[i] : 1.0f);
     });
   }

@@ -11,13 +11,13 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
+#include "renderer/core/plane.h"
 
 namespace braid {
 
 namespace {
 
 constexpr int kMaxSide = 65536;
-constexpr int64_t kMaxPixels = int64_t(1) << 28;
 constexpr size_t kMaxEstimates = 256;
 
 // A word without spaces; the empty one is "%".

@@ -234,8 +234,7 @@ class SceneBuilder {
   void buildMeshes() {
     std::vector<TriangleMesh> built(jobs_.size());
     std::vector<Report> reports(jobs_.size());
-    tbb::parallel_for(size_t(0), jobs_.size(),
-                      [&](size_t i) { built[i] = buildMesh(document_, jobs_[i], reports[i]); });
+    parallelFor(jobs_.size(), [&](size_t i) { built[i] = buildMesh(document_, jobs_[i], reports[i]); });
     for (const Report& report : reports) document_.report.append(report);
     // Points, lines and empty primitives leave no mesh.
     std::vector<uint32_t> placed(jobs_.size(), kNone);

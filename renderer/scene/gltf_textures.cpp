@@ -138,8 +138,8 @@ void MaterialTable::loadTextures() {
     if (firstOf.emplace(std::make_pair(source.uri, source.view), image).second) unique.push_back(image);
   }
   PixelBudget budget(document_.sourceBytes());
-  tbb::parallel_for(size_t(0), unique.size(),
-                    [&](size_t i) { decode(document_, document_.images[unique[i]], budget, decoded[unique[i]]); });
+  parallelFor(unique.size(),
+              [&](size_t i) { decode(document_, document_.images[unique[i]], budget, decoded[unique[i]]); });
   for (const uint32_t image : unique) {
     DecodedImage& item = decoded[image];
     if (!item.problem.empty()) document_.report.problem("/images/" + std::to_string(image), item.problem);

@@ -112,7 +112,7 @@ void resolveViews(Document& document) {
     if (source && meshoptLayoutValid(*view.meshopt, view.length, extension))
       compressed.push_back({&view, *source, extension});
   }
-  tbb::parallel_for(size_t(0), compressed.size(), [&](size_t i) {
+  parallelFor(compressed.size(), [&](size_t i) {
     CompressedView& item = compressed[i];
     // Never allocated beyond the check above: at most 256 times the compressed bytes.
     item.view->decoded.resize(item.view->meshopt->count * item.view->meshopt->stride);

@@ -2,21 +2,17 @@
 #include "renderer/scene/scene.h"
 
 #include <algorithm>
-#include <chrono>
 #include <map>
 
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
 #include "renderer/core/parallel.h"
+#include "renderer/core/stopwatch.h"
 #include "renderer/scene/closed_mesh.h"
 
 namespace braid {
 
 namespace {
-
-double secondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 // Bakes a transform into a mesh. Normals go by the inverse transpose; a mirrored mesh has its winding turned so that
 // the cross product of the edges keeps pointing to the front.
@@ -25,7 +21,7 @@ void transformMesh(TriangleMesh& mesh, const Mat4& toWorld) {
   const Mat3 linear(toWorld);
   const Mat3 normalMatrix = glm::transpose(glm::inverse(linear));
   const bool mirrored = glm::determinant(linear) < 0;
-  parallelChunks(mesh.positions.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(mesh.positions.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) mesh.positions[i] = Vec3(toWorld * Vec4(mesh.positions[i], 1));
   });
   for (Vec3& n : mesh.normals) {
@@ -45,16 +41,16 @@ void transformMesh(TriangleMesh& mesh, const Mat4& toWorld) {
 }  // namespace
 
 Scene::Scene(SceneData data, const SceneOptions& options) : data_(std::move(data)) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch preparing;
   for (const TriangleMesh& mesh : data_.meshes) BRAID_ASSERT(mesh.material < data_.materials.size());
   if (data_.environment) environment_.emplace(*data_.environment);
   placeMeshes();
   markFilteredMeshes(options.full);
   collectEmitters();
   detectTraits();
-  times_.prepare = secondsSince(start);
+  times_.prepare = preparing.seconds();
 
-  const auto buildStart = std::chrono::steady_clock::now();
+  const Stopwatch building;
   AccelInput input;
   input.meshes = &data_.meshes;
   input.filtered = &filtered_;
@@ -65,7 +61,7 @@ Scene::Scene(SceneData data, const SceneOptions& options) : data_(std::move(data
   input.highQuality = options.highQuality.value_or(traits_.triangles <= 4'000'000);
   const bool anyFilter = std::any_of(filtered_.begin(), filtered_.end(), [](uint8_t f) { return f != 0; });
   accel_.build(input, anyFilter ? this : nullptr);
-  times_.hierarchy = secondsSince(buildStart);
+  times_.hierarchy = building.seconds();
 }
 
 // Meshes placed once are baked into world space, which spares every ray the instance transform; meshes placed several
@@ -123,7 +119,7 @@ void Scene::placeMeshes() {
 // single-sided surface. A closed outward-facing surface is never seen from behind, so its back faces need no culling.
 void Scene::markFilteredMeshes(bool full) {
   filtered_.assign(data_.meshes.size(), 0);
-  tbb::parallel_for(size_t(0), data_.meshes.size(), [&](size_t m) {
+  parallelFor(data_.meshes.size(), [&](size_t m) {
     const TriangleMesh& mesh = data_.meshes[m];
     const Material& material = data_.materials[mesh.material];
     const bool culled = !material.doubleSided && !material.transmissive() && material.diffuseTransmission == 0;

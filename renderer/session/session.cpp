@@ -3,25 +3,17 @@
 
 #include <algorithm>
 #include <bit>
-#include <chrono>
 
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include "renderer/core/error.h"
+#include "renderer/core/parallel.h"
+#include "renderer/core/stopwatch.h"
 #include "renderer/session/pixel_options.h"
 
 namespace braid {
 
 namespace {
-
-class Clock {
- public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 bool isSet(const std::atomic<bool>* flag) { return flag && flag->load(); }
 
@@ -64,7 +56,7 @@ class Session::Loop {
         startSeconds_(session.film_.seconds) {
     result_.rounds = result_.firstRound = film_.rounds();
     for (size_t i = 0; i < plan_.integrators.size(); ++i) {
-      const Clock preparing;
+      const Stopwatch preparing;
       preparations_.push_back(plan_.integrators[i].integrator->prepare(session_.context_, plan_));
       film_.estimates[i].seconds += preparing.seconds();
     }
@@ -82,7 +74,7 @@ class Session::Loop {
   // The passes that are missing to the next round, of every integrator. False when abandoned.
   bool round() {
     for (size_t i = 0; i < plan_.integrators.size(); ++i) {
-      const Clock clock;
+      const Stopwatch clock;
       const uint64_t wanted = (result_.rounds + 1) * static_cast<uint64_t>(plan_.integrators[i].passesPerRound);
       bool done = true;
       while (done && film_.estimates[i].sums.passes() < wanted) done = pass(i);
@@ -141,7 +133,7 @@ class Session::Loop {
   const std::atomic<bool>* abandon_;
   PassStatistics& statistics_;
   RenderResult& result_;
-  const Clock clock_;
+  const Stopwatch clock_;
   PassTarget target_;
   std::vector<std::shared_ptr<const Preparation>> preparations_;
   const double startSeconds_;
@@ -205,9 +197,7 @@ RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bo
                           const std::atomic<bool>* abandon, const std::atomic<bool>* reached) {
   PassStatistics statistics;
   RenderResult result;
-  const int threads = plan_.settings.threads;
-  tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
-  arena.execute([&] {
+  withThreads(plan_.settings.threads, [&] {
     Loop loop(*this, abandon, statistics, result);
     while (!loop.limitReached()) {
       const bool abandoned = !loop.round();

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "renderer/core/parallel.h"
 #include "renderer/transport/light_tree.h"
 
 #include <algorithm>
 #include <array>
 #include <numeric>
-
-#include <tbb/parallel_invoke.h>
 
 namespace braid {
 
@@ -141,7 +140,7 @@ LightBounds LightTree::buildNode(std::vector<uint32_t>& order, size_t begin, siz
     const auto buildLeft = [&] { l = buildNode(order, begin, middle, node + 1, lights, depth + 1); };
     const auto buildRight = [&] { r = buildNode(order, middle, end, node + 2 * left, lights, depth + 1); };
     if (count > 4096) {
-      tbb::parallel_invoke(buildLeft, buildRight);
+      parallelBoth(buildLeft, buildRight);
     } else {
       buildLeft();
       buildRight();

@@ -9,6 +9,7 @@
 
 #include "renderer/scene/camera.h"
 #include "renderer/scene/scene.h"
+#include "renderer/transport/hit.h"
 
 namespace braid {
 
@@ -69,6 +70,38 @@ inline Spectrum volumeTransmittance(const Material& m, float distance) {
   const float x = distance / m.attenuationDistance;
   if (!std::isfinite(x)) return Spectrum(0);
   return {std::pow(m.attenuationColor.x, x), std::pow(m.attenuationColor.y, x), std::pow(m.attenuationColor.z, x)};
+}
+
+// The same through whatever rules there.
+inline Spectrum mediaTransmittance(const Scene& scene, const MediaStack& media, float distance) {
+  if (media.empty()) return Spectrum(1);
+  const int64_t medium = media.ruling(scene.materials());
+  return medium < 0 ? Spectrum(1) : volumeTransmittance(scene.materials()[static_cast<size_t>(medium)], distance);
+}
+
+// Refractive index on the outside of a hit surface, for a path inside of `media`.
+inline float indexOutside(const Scene& scene, const MediaStack& media, const Hit& hit) {
+  if (media.empty()) return 1;
+  const int64_t medium = media.ruling(scene.materials(), hit.front ? -1 : static_cast<int64_t>(hit.mesh->material));
+  return medium < 0 ? 1.0f : scene.materials()[static_cast<size_t>(medium)].ior;
+}
+
+// Whether the hit surface of a solid lies inside of another one that rules there: it scatters nothing, and rays go
+// straight on.
+inline bool isNullInterface(const Scene& scene, const MediaStack& media, const Hit& hit) {
+  const auto material = static_cast<int64_t>(hit.mesh->material);
+  const int64_t other = media.ruling(scene.materials(), hit.front ? -1 : material);
+  return other >= 0 && MediaStack::outranks(scene.materials(), other, material);
+}
+
+// Takes the path through the hit surface and returns the ratio of the refractive indices before and after.
+inline float crossInterface(const Scene& scene, MediaStack& media, const Hit& hit) {
+  const auto index = [&](int64_t m) {
+    return m < 0 ? 1.0f : std::max(scene.materials()[static_cast<size_t>(m)].ior, 1e-3f);
+  };
+  const float before = index(media.ruling(scene.materials()));
+  media.cross(hit.mesh->material, hit.front);
+  return before / index(media.ruling(scene.materials()));
 }
 
 }  // namespace braid

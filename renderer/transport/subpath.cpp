@@ -24,12 +24,6 @@ float adjointFactor(const SubpathVertex& v, float wiShading, float wiGeometric) 
 
 }  // namespace
 
-Spectrum mediaTransmittance(const Scene& scene, const MediaStack& media, float distance) {
-  if (media.empty()) return Spectrum(1);
-  const int64_t medium = media.ruling(scene.materials());
-  return medium < 0 ? Spectrum(1) : volumeTransmittance(scene.materials()[static_cast<size_t>(medium)], distance);
-}
-
 VertexValue evaluateVertex(const TransportContext& context, const SubpathVertex& vertex, Transport transport,
                            const Vec3& wi) {
   VertexValue value;
@@ -118,13 +112,6 @@ void SubpathBatch::queueRay(int slot, SubpathState& state) {
   rays_.set(slot, {state.origin, state.direction, kInfinity, state.salt});
 }
 
-float SubpathBatch::indexOutside(const SubpathState& state, const Hit& hit) const {
-  if (state.media.empty()) return 1;
-  const int64_t medium =
-      state.media.ruling(scene_.materials(), hit.front ? -1 : static_cast<int64_t>(hit.mesh->material));
-  return medium < 0 ? 1.0f : scene_.materials()[static_cast<size_t>(medium)].ior;
-}
-
 SubpathBatch::Arrival SubpathBatch::arrive(SubpathState& state, const RayHit& query, Hit& hit) const {
   makeHit(scene_, query, state.direction, hit);
   state.throughput *= mediaTransmittance(scene_, state.media, hit.distance);
@@ -166,10 +153,8 @@ SubpathBatch::Arrival SubpathBatch::arrive(SubpathState& state, const RayHit& qu
 
 // As in the path tracer: inside of a solid that rules there, another solid's surface scatters nothing.
 bool SubpathBatch::crossNullInterface(SubpathState& state, const Hit& hit) const {
-  const uint32_t material = hit.mesh->material;
-  const int64_t other = state.media.ruling(scene_.materials(), hit.front ? -1 : static_cast<int64_t>(material));
-  if (other < 0 || !MediaStack::outranks(scene_.materials(), other, static_cast<int64_t>(material))) return false;
-  state.media.cross(material, hit.front);
+  if (!isNullInterface(scene_, state.media, hit)) return false;
+  state.media.cross(hit.mesh->material, hit.front);
   state.origin = offsetOrigin(hit, state.direction);
   state.lightCouldNotBeSampled = true;
   ++state.nullCrossings;
@@ -208,13 +193,8 @@ bool SubpathBatch::scatter(SubpathState& state, const SubpathVertex& vertex) con
   if (isBlack(state.throughput)) return false;
 
   if (sample.transmitted && hit.material->hasVolume()) {
-    const auto index = [&](int64_t m) {
-      return m < 0 ? 1.0f : std::max(scene_.materials()[static_cast<size_t>(m)].ior, 1e-3f);
-    };
-    const int64_t before = state.media.ruling(scene_.materials());
-    state.media.cross(hit.mesh->material, hit.front);
-    const int64_t after = state.media.ruling(scene_.materials());
-    if (!power) state.etaScale *= sqr(index(before) / index(after));
+    const float eta = crossInterface(scene_, state.media, hit);
+    if (!power) state.etaScale *= sqr(eta);
   }
   if (settings_.mis) {
     const double cosine = geometricCosine(hit, direction);

@@ -99,9 +99,6 @@ struct SubpathState {
 VertexValue evaluateVertex(const TransportContext& context, const SubpathVertex& vertex, Transport transport,
                            const Vec3& wi);
 
-// Transmittance of the ruling medium of a stack over a distance in metres.
-Spectrum mediaTransmittance(const Scene& scene, const MediaStack& media, float distance);
-
 // Walks up to kBatch subpaths in step, as the path tracer's kernel does.
 class SubpathBatch {
  public:
@@ -134,7 +131,6 @@ class SubpathBatch {
   void finishVertex(const SubpathState& state, const Hit& hit, SubpathVertex& vertex) const;
   bool scatter(SubpathState& state, const SubpathVertex& vertex) const;
   bool crossNullInterface(SubpathState& state, const Hit& hit) const;
-  float indexOutside(const SubpathState& state, const Hit& hit) const;
 
   const TransportContext& context_;
   const Scene& scene_;
@@ -175,9 +171,9 @@ void SubpathBatch::run(const OnHit& onHit, const OnMiss& onMiss) {
         const uint32_t lobes = context_.summaryOf(hit).lobes;
         const Vec3 wo = hit.frame.toLocal(hit.wo);
         SubpathVertex vertex =
-            lobes == kLobeDiffuse
-                ? SubpathVertex(baseColorAt(scene_, hit), wo)
-                : SubpathVertex(surfaceAt(scene_, hit, lobes, indexOutside(state, hit)), wo, settings_.transport);
+            lobes == kLobeDiffuse ? SubpathVertex(baseColorAt(scene_, hit), wo)
+                                  : SubpathVertex(surfaceAt(scene_, hit, lobes, indexOutside(scene_, state.media, hit)),
+                                                  wo, settings_.transport);
         finishVertex(state, hit, vertex);
         if (!onHit(index, state, vertex)) continue;
         if (state.segments >= settings_.maxSegments || !scatter(state, vertex)) continue;

@@ -21,7 +21,6 @@ namespace {
 
 using Taps = std::vector<float>;
 
-constexpr size_t kChunk = 4096;
 constexpr float kColourExponent = 0.7f;    // q_c
 constexpr float kColourKnee = 0.4f;        // p_c: fraction of the largest difference that maps to p_t
 constexpr float kColourKneeValue = 0.95f;  // p_t
@@ -156,7 +155,7 @@ struct FeatureFilter {
     const auto strength = [&](const Taps& taps) {
       Plane<float> x = filterColumns(filterRows(luminance, taps), smooth);
       const Plane<float> y = filterColumns(smoothRows, taps);
-      parallelChunks(x.size(), kChunk, [&](size_t begin, size_t end) {
+      parallelChunks(x.size(), kPixelChunk, [&](size_t begin, size_t end) {
         for (size_t i = begin; i < end; ++i) x[i] = std::sqrt(sqr(x[i]) + sqr(y[i]));
       });
       return x;
@@ -177,7 +176,7 @@ Perceived perceive(const Rgb<float>& display, const SensitivityFilter& eye, cons
   const int width = display.width(), height = display.height();
   Rgb<float> opponent(width, height);
   Plane<float> relativeLuminance(width, height);
-  parallelChunks(display.size(), kChunk, [&](size_t begin, size_t end) {
+  parallelChunks(display.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const Vec3 o = opponentOf(display.pixel(i));
       opponent.set(i, o);
@@ -187,7 +186,7 @@ Perceived perceive(const Rgb<float>& display, const SensitivityFilter& eye, cons
   Perceived p;
   p.lab = eye.apply(opponent);
   static const Mat3 toRgb = glm::inverse(toRelativeXyz());
-  parallelChunks(display.size(), kChunk, [&](size_t begin, size_t end) {
+  parallelChunks(display.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const Vec3 rgb = glm::clamp(toRgb * relativeXyzOf(p.lab.pixel(i)), 0.0f, 1.0f);
       p.lab.set(i, huntLab(toRelativeXyz() * rgb));
@@ -200,7 +199,7 @@ Perceived perceive(const Rgb<float>& display, const SensitivityFilter& eye, cons
 // Keeps the larger of the error so far and the error between the two images.
 void maximise(const Perceived& a, const Perceived& r, Plane<float>& error) {
   static const float largest = largestColourDifference();
-  parallelChunks(error.size(), kChunk, [&](size_t begin, size_t end) {
+  parallelChunks(error.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const float colour = colourError(hyab(a.lab.pixel(i), r.lab.pixel(i)), largest);
       const float structure = std::max(std::fabs(a.edges[i] - r.edges[i]), std::fabs(a.points[i] - r.points[i]));
@@ -214,7 +213,7 @@ Rgb<float> exposed(const Rgb<float>& image, float stops) {
   const float scale = std::exp2(stops);
   Rgb<float> out(image.width(), image.height());
   for (size_t c = 0; c < 3; ++c)
-    parallelChunks(image.size(), kChunk, [&](size_t begin, size_t end) {
+    parallelChunks(image.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) out[c][i] = acesTonemap(scale * image[c][i]);
     });
   return out;

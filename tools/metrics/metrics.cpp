@@ -16,14 +16,13 @@ namespace braid {
 
 namespace {
 
-constexpr size_t kChunk = 4096;
 constexpr double kInfiniteError = std::numeric_limits<double>::infinity();
 
 // Errors of pixels that depend on the two pixels alone.
 template <class Error>
 Plane<double> perPixel(const Rgb<float>& image, const Rgb<float>& reference, const Error& error) {
   Plane<double> out(image.width(), image.height());
-  parallelChunks(out.size(), kChunk, [&](size_t begin, size_t end) {
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       double a[3], r[3];
       for (size_t c = 0; c < 3; ++c) {
@@ -102,7 +101,7 @@ double trimmedMean(const Plane<double>& errors, const std::vector<char>& use, ui
     uint64_t count = 0;
     void operator+=(const Sum& s) { value += s.value, count += s.count; }
   };
-  const Sum below = parallelSum(errors.size(), kChunk, Sum{}, [&](size_t begin, size_t end) {
+  const Sum below = parallelSum(errors.size(), kPixelChunk, Sum{}, [&](size_t begin, size_t end) {
     Sum s;
     for (size_t i = begin; i < end; ++i)
       if (use[i] && errors[i] < limit) s += {errors[i], 1};

@@ -25,7 +25,7 @@ std::vector<double> window() {
 
 Plane<double> product(const Plane<double>& a, const Plane<double>& b) {
   Plane<double> out(a.width, a.height);
-  parallelChunks(a.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(a.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) out[i] = a[i] * b[i];
   });
   return out;
@@ -33,7 +33,7 @@ Plane<double> product(const Plane<double>& a, const Plane<double>& b) {
 
 Plane<double> display(const Plane<float>& linear) {
   Plane<double> out(linear.width, linear.height);
-  parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) out[i] = static_cast<double>(displayValue(linear[i]));
   });
   return out;
@@ -50,7 +50,7 @@ Plane<double> dssimErrors(const Rgb<float>& image, const Rgb<float>& reference) 
     const Plane<double> x = display(image[c]), y = display(reference[c]);
     const Plane<double> mx = average(x), my = average(y);
     const Plane<double> xx = average(product(x, x)), yy = average(product(y, y)), xy = average(product(x, y));
-    parallelChunks(out.size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         const double mean2 = mx[i] * my[i], varX = xx[i] - sqr(mx[i]), varY = yy[i] - sqr(my[i]);
         const double ssim =

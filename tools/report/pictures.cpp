@@ -99,7 +99,7 @@ float exposureOf(const Rgb<float>& reference) {
 
 Picture toneMapped(const Rgb<float>& image, float exposure) {
   Picture p = blank(image.width(), image.height());
-  parallelChunks(image.size(), 4096, [&](size_t begin, size_t end) {
+  parallelChunks(image.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const Vec3 v = exposure * image.pixel(i);
       set(p, i, isFinite(v) ? Vec3(displayValue(v.x), displayValue(v.y), displayValue(v.z)) : Vec3(1, 0, 1));
