@@ -28,6 +28,15 @@ std::pair<std::string, std::string> splitChain(const std::string& name) {
   return {name.substr(0, at), name.substr(at + 1)};
 }
 
+std::vector<std::string> splitAtPlus(const std::string& text) {
+  std::vector<std::string> parts;
+  for (size_t begin = 0, end = 0; end != std::string::npos; begin = end + 1) {
+    end = text.find('+', begin);
+    parts.push_back(text.substr(begin, end == std::string::npos ? end : end - begin));
+  }
+  return parts;
+}
+
 std::string plural(uint64_t count, const char* noun, const char* nouns) {
   return fmt::format("{} {}", count, count == 1 ? noun : nouns);
 }
@@ -42,11 +51,11 @@ class RecipeMaker {
   Recipe recipe;
 
  private:
-  void fill(Step& step, const std::string& chosenBiased);
+  void fill(Step& step, const std::string& chosen);
   std::string fillUnbiased(Step& step);
   std::string fillCorrelated(Step& step);
   std::string fillBiased(Step& step, const std::string& chosen);
-  std::string fillBases(Step& step);
+  std::string fillBases(Step& step, const std::string& chosen);
   std::string defaultBiased(const Needs& needs);
   std::vector<std::string> denoisersInOrder() const;
   std::string lacks(const std::string& estimate, const Needs& needs, bool unbiased) const;
@@ -62,23 +71,25 @@ std::string RecipeMaker::add(const std::string& name) {
   if (!inProgress_.insert(name).second) return fmt::format("{} would be its own input", name);
   Step step;
   step.name = name;
-  const auto [method, biased] = splitChain(name);
+  const auto [method, chosen] = splitChain(name);
   step.method = findMethod(method);
-  fill(step, biased);
+  fill(step, chosen);
   inProgress_.erase(name);
   const std::string obstacle = step.obstacle;
   recipe.steps.push_back(std::move(step));
   return obstacle;
 }
 
-void RecipeMaker::fill(Step& step, const std::string& chosenBiased) {
+void RecipeMaker::fill(Step& step, const std::string& chosen) {
   const Needs needs = step.method->needs();
+  const bool takesBases = needs.bases > 0 || needs.anyBases;
   if (const auto* outside = dynamic_cast<const OutsideMethod*>(step.method.get())) step.obstacle = outside->obstacle();
   if (step.obstacle.empty()) step.obstacle = fillUnbiased(step);
   if (step.obstacle.empty() && needs.correlated) step.obstacle = fillCorrelated(step);
-  if (step.obstacle.empty() && (needs.biased || !chosenBiased.empty()))
-    step.obstacle = needs.biased ? fillBiased(step, chosenBiased) : "it takes no biased input";
-  if (step.obstacle.empty() && (needs.bases > 0 || needs.anyBases)) step.obstacle = fillBases(step);
+  if (step.obstacle.empty() && needs.biased) step.obstacle = fillBiased(step, chosen);
+  if (step.obstacle.empty() && !needs.biased && !takesBases && !chosen.empty())
+    step.obstacle = "it takes no biased input";
+  if (step.obstacle.empty() && takesBases) step.obstacle = fillBases(step, needs.biased ? "" : chosen);
 }
 
 // What an estimate lacks for the needs, or nothing.
@@ -170,9 +181,9 @@ std::string RecipeMaker::fillBiased(Step& step, const std::string& chosen) {
   return lacks(step.biased, needs, false);
 }
 
-std::string RecipeMaker::fillBases(Step& step) {
+std::string RecipeMaker::fillBases(Step& step, const std::string& chosen) {
   const Needs needs = step.method->needs();
-  std::vector<std::string> candidates = options_.bases;
+  std::vector<std::string> candidates = chosen.empty() ? options_.bases : splitAtPlus(chosen);
   std::string refused;
   const auto keep = [&](const std::string& name) {
     std::string obstacle = add(name);

@@ -17,9 +17,9 @@
 //               estimate, but not for methods that run the denoiser again (SURE); or else the first that runs of oidn,
 //               nfor, rdfc, pw, nlm; or else the first other denoiser that runs. Never box, which is input for stress
 //               tests. The named input itself gets the default one when it needs a biased input.
-//   bases       as named; or else the denoisers asked for and, when they are too few, all denoisers that run but box,
-//   and
-//               for methods that want them the biased estimates.
+//   bases       after '@' with '+' between them, as in ensemble@nfor+rdfc; or as named for all; or else the denoisers
+//               asked for and, when they are too few, all denoisers that run but box; and for methods that want them
+//               the biased estimates.
 #pragma once
 
 #include <memory>

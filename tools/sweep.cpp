@@ -52,6 +52,7 @@ class Sweep {
   void expectWork();
   // False when interrupted.
   bool runScene(size_t index, const std::vector<SweepJob>& jobs);
+  std::string plannedIntegrators(const SweepScene& scene) const;
   bool findReference(SweepScene& scene);
   bool renderReference(SweepScene& scene, const std::string& integrator);
   void warmUp(const SweepScene& scene, const SweepJob& job) const;
@@ -119,8 +120,9 @@ void Sweep::checkInputs() const {
     const std::string file = valueForScene(o_.references, name, ""),
                       integrator = valueForScene(o_.referenceIntegrators, name, "pt");
     if (!file.empty() && !fs::exists(file)) throw Error(ExitCode::BadInput, file + ": no such reference");
-    const bool known = std::any_of(integrators_.begin(), integrators_.end(),
-                                   [&](const Integrator* i) { return i->name() == integrator; });
+    const bool known =
+        integrator == "auto" || std::any_of(integrators_.begin(), integrators_.end(),
+                                            [&](const Integrator* i) { return i->name() == integrator; });
     if (!known) throw Error(ExitCode::Usage, fmt::format("--reference-integrator: no integrator '{}'", integrator));
   }
 }
@@ -210,10 +212,21 @@ bool Sweep::renderReference(SweepScene& scene, const std::string& integrator) {
   return true;
 }
 
+std::string Sweep::plannedIntegrators(const SweepScene& scene) const {
+  Settings settings = settings_;
+  settings.integrators = {"auto"};
+  settings.spp = 64;
+  std::string names;
+  for (const PlannedIntegrator& i : makePlan(*scene.scene, scene.camera, settings, integrators_).integrators)
+    names += (names.empty() ? "" : "+") + std::string(i.integrator->name());
+  return names;
+}
+
 bool Sweep::findReference(SweepScene& scene) {
   const ReferenceFrame frame = referenceFrame(*scene.scene, scene.camera, settings_);
-  const std::string file = valueForScene(o_.references, scene.name, ""),
-                    integrator = valueForScene(o_.referenceIntegrators, scene.name, "pt");
+  const std::string file = valueForScene(o_.references, scene.name, "");
+  std::string integrator = valueForScene(o_.referenceIntegrators, scene.name, "pt");
+  if (integrator == "auto") integrator = scene.planned.find("sppm") == std::string::npos ? "pt" : "vcm";
   if (!file.empty()) {
     scene.reference = readReference(file, frame, integrator, o_.seed, static_cast<uint64_t>(o_.seeds));
     return true;
@@ -240,8 +253,14 @@ void Sweep::warmUp(const SweepScene& scene, const SweepJob& job) const {
 void Sweep::keepRow(const SweepRow& row, const Rgb<float>& image) {
   const auto l =
       std::find_if(ladders_.begin(), ladders_.end(), [&](const LadderRungs& x) { return x.ladder == row.ladder; });
-  if (row.seed == o_.seed && row.mark == l->rungs.back() && !image.empty())
-    writeExr(imagePath(o_.output, row.scene, row.method, row.ladder, row.mark), {}, image, nullptr, {});
+  if (row.mark == l->rungs.back() && !image.empty()) {
+    ExrOptions exr;
+    exr.floatHeadline = true;
+    const std::string path = row.seed == o_.seed
+                                 ? imagePath(o_.output, row.scene, row.method, row.ladder, row.mark)
+                                 : replicatePath(o_.output, row.scene, row.method, row.ladder, row.mark, row.seed);
+    writeExr(path, {}, image, nullptr, exr);
+  }
   appendSweepRow(path("sweep.csv"), row);
   table_.rows.push_back(row);
 }
@@ -314,6 +333,7 @@ bool Sweep::runScene(size_t index, const std::vector<SweepJob>& jobs) {
   scene.loadSeconds = times.load;
   scene.camera = chooseCamera(data, choice);
   scene.scene = buildScene(std::move(data), choice);
+  scene.planned = plannedIntegrators(scene);
   if (!findReference(scene)) return false;
   recordScene(scene);
   warmUp(scene, jobs.front());

@@ -19,6 +19,7 @@ namespace braid {
 struct SweepOptions {
   std::vector<std::string> scenes;  // files
   std::string output;               // folder
+  std::string preset;               // its name, empty: none; already applied
   std::string spp, time;            // ladders such as 4:1024 or 1:32; both empty: 4:256 samples
   std::vector<std::string> methods{"pt"};
   int seeds = 1;

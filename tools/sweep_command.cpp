@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The command line of `braid sweep`.
 #include <iostream>
+#include <set>
 
 #include "tools/cli.h"
 #include "tools/sweep.h"
+#include "tools/sweep_preset.h"
 
 namespace braid {
 
@@ -19,6 +21,8 @@ void addSweep(CLI::App& app, Action& action) {
     return c->add_option(name, value, text)->delimiter(',')->allow_extra_args(false);
   };
   list("--methods", o.methods, "Methods, separated by commas (--list prints them)")->capture_default_str();
+  c->add_option("--preset", o.preset,
+                "papers: the comparisons of the five papers behind the combiners, but for the options given");
   c->add_option("--seeds", o.seeds, "Runs with different seeds")->capture_default_str()->check(CLI::Range(1, 1000000));
   c->add_option("--seed", o.seed, "Seed of the first run")->capture_default_str();
   c->add_option("--reference-spp", o.referenceSpp, "Samples of the references that are rendered")
@@ -26,7 +30,8 @@ void addSweep(CLI::App& app, Action& action) {
       ->check(CLI::Range(uint64_t(2), uint64_t(1) << 40));
   list("--reference", o.references, "Reference image instead, or SCENE=FILE,SCENE=FILE");
   list("--reference-integrator", o.referenceIntegrators,
-       "Integrator of the references (default pt); SCENE=NAME overrides it for a scene");
+       "Integrator of the references (default pt), or auto: vcm where the plan keeps photon maps, else pt; SCENE=NAME "
+       "overrides it for a scene");
   list("--metric", o.metrics, "Metrics, the one of plots and ratios first (default: all, relL2 first)");
   c->add_option("--size", o.size, "Pixels, WIDTHxHEIGHT")->capture_default_str();
   c->add_option("--max-depth", o.maxDepth, "Longest path in segments, the camera's included")
@@ -44,8 +49,15 @@ void addSweep(CLI::App& app, Action& action) {
       "Examples:\n"
       "  braid sweep scenes/cornell.glb -o out --spp 4:1024 --methods pt --seeds 4\n"
       "  braid sweep scenes/*.glb -o out --time 1:32 --methods pt,bdpt --reference-spp 32768 \\\n"
-      "      --reference-integrator pt,pool=bdpt");
-  c->callback([options, &action] { action = [options] { return runSweep(*options, std::cout); }; });
+      "      --reference-integrator pt,pool=bdpt\n"
+      "  braid sweep --preset papers scenes/*.glb -o papers");
+  c->callback([options, c, &action] {
+    std::set<std::string> given;
+    for (const CLI::Option* option : c->get_options())
+      if (option->count() > 0) given.insert(option->get_name());
+    if (!options->preset.empty()) applyPreset(options->preset, given, *options);
+    action = [options] { return runSweep(*options, std::cout); };
+  });
 }
 
 }  // namespace braid

@@ -57,6 +57,24 @@ double relL2Unbiased(const Rgb<float>& image, const ReferenceImage& reference) {
   });
 }
 
+double relativeSquaredBias(const std::vector<Rgb<float>>& runs, const ReferenceImage& reference) {
+  BRAID_ASSERT(runs.size() >= 2);
+  if (!reference.hasHalves()) return std::numeric_limits<double>::quiet_NaN();
+  const Rgb<float>&a = reference.half[0], &b = reference.half[1];
+  for (const Rgb<float>& run : runs) BRAID_ASSERT(run.size() == a.size() && run.width() == a.width());
+  const auto n = static_cast<double>(runs.size());
+  return relativeMean(reference, runs.front(), [&](size_t c, size_t i) {
+    double toA = 0, toB = 0, squares = 0;
+    for (const Rgb<float>& run : runs) {
+      const double x = at(run, c, i) - at(a, c, i), y = at(run, c, i) - at(b, c, i);
+      toA += x;
+      toB += y;
+      squares += x * y;
+    }
+    return (toA * toB - squares) / (n * (n - 1));
+  });
+}
+
 double referenceNoise(const ReferenceImage& reference) {
   if (!reference.hasHalves()) return std::numeric_limits<double>::quiet_NaN();
   const Rgb<float>&a = reference.half[0], &b = reference.half[1];

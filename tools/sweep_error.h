@@ -2,6 +2,8 @@
 // Errors against a reference that is noisy itself: with two independent halves of the reference its noise drops out.
 #pragma once
 
+#include <vector>
+
 #include "renderer/core/plane.h"
 
 namespace braid {
@@ -17,6 +19,12 @@ struct ReferenceImage {
 // nothing on average (ALGORITHMS-BEYOND 8.1). May be negative where the noise of the reference exceeds the error.
 // Pixels with a non-finite reference are left out; infinite when the image is not finite; NaN without halves.
 double relL2Unbiased(const Rgb<float>& image, const ReferenceImage& reference);
+
+// Mean over pixels and channels of squared bias / (mean_RGB(R)² + 0.01): with e_k the errors of N >= 2 independent
+// runs, (Σ e_k)² - Σ e_k² over N (N - 1) has the mean bias² (products of different runs), and the halves of the
+// reference keep its noise out as in relL2Unbiased(). May be negative where there is next to no bias. NaN without
+// halves, infinite when an image is not finite.
+double relativeSquaredBias(const std::vector<Rgb<float>>& runs, const ReferenceImage& reference);
 
 // What the noise of the reference's mean adds to relL2, on average: mean of ((A - B)/2)² / (mean_RGB(R)² + 0.01).
 // NaN without halves.

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,7 +23,8 @@ struct MethodShare {
 struct MethodImage {
   Rgb<float> image;  // empty when it could not run
   double denoiseSeconds = 0, combineSeconds = 0;
-  std::string obstacle;  // why it could not
+  std::string obstacle;         // why it could not
+  std::optional<double> error;  // estimated by the method itself, as relativeError(); none where it says nothing
 };
 
 // A method. Without `finish` it is an integrator, and its image is the mean of its only input. The estimates that

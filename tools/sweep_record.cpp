@@ -75,6 +75,7 @@ Json sceneRecord(const SweepScene& scene, const ReferenceFrame& frame) {
           {"file", scene.file},
           {"hash", hexString(frame.sceneHash)},
           {"frame", referenceName(frame)},
+          {"planned", scene.planned},
           {"seconds",
            {{"load", scene.loadSeconds},
             {"prepare", scene.scene->buildTimes().prepare},

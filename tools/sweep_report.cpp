@@ -5,13 +5,17 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 
 #include <fmt/format.h>
 
 #include "renderer/core/error.h"
 #include "renderer/film/exr.h"
 #include "tools/report/html.h"
+#include "tools/report/papers.h"
 #include "tools/report/plots.h"
+#include "tools/report/replicates.h"
+#include "tools/sweep_error.h"
 
 namespace braid {
 
@@ -73,15 +77,47 @@ const Json* findScene(const Json& record, const std::string& name) {
   return nullptr;
 }
 
-Rgb<float> readReferenceMean(const Json& scene) {
+ReferenceImage readReferenceImage(const Json& scene) {
   const std::string file = scene["reference"]["file"], integrator = scene["reference"]["integrator"];
-  return readImage(file).rgb(integrator.empty() ? "" : integrator + ".mean");
+  const ImageFile image = readImage(file);
+  if (integrator.empty()) return {image.rgb(), {}};
+  return {image.rgb(integrator + ".mean"), {image.rgb(integrator + ".halfA"), image.rgb(integrator + ".halfB")}};
 }
 
-ReportScene readScene(const std::string& folder, const SweepSummary& summary, const Json& scene) {
+// Squared bias of every method of a scene that ran with two seeds or more, at the last rung.
+std::vector<ReplicateBias> replicateBiases(const std::string& folder, const SweepTable& table,
+                                           const SweepSummary& summary, const std::string& scene,
+                                           const ReferenceImage& reference) {
+  std::vector<ReplicateBias> biases;
+  if (!reference.hasHalves()) return biases;
+  const size_t column = table.column("relL2_unbiased");
+  for (const std::string& method : summary.methods) {
+    const MethodSummary* m = summary.find(scene, method);
+    if (!m) continue;
+    std::vector<Rgb<float>> runs;
+    double error = 0;
+    for (const SweepRow& r : table.rows) {
+      if (r.scene != scene || r.method != method || r.ladder != summary.timeLadder || r.mark != m->curve.back().mark)
+        continue;
+      std::string path = replicatePath(folder, scene, method, r.ladder, r.mark, r.seed);
+      if (!std::filesystem::exists(path)) path = runs.empty() ? imagePath(folder, scene, method, r.ladder, r.mark) : "";
+      if (path.empty() || !std::filesystem::exists(path)) continue;
+      runs.push_back(readImage(path).rgb());
+      error += r.values[column];
+    }
+    if (runs.size() < 2) continue;
+    const double squaredBias = relativeSquaredBias(runs, reference);
+    biases.push_back({scene, method, static_cast<int>(runs.size()), squaredBias,
+                      error / static_cast<double>(runs.size()) - squaredBias});
+  }
+  return biases;
+}
+
+ReportScene readScene(const std::string& folder, const SweepSummary& summary, const Json& scene,
+                      const Rgb<float>& reference) {
   ReportScene s;
   s.name = scene["name"];
-  s.reference = readReferenceMean(scene);
+  s.reference = reference;
   for (const std::string& method : summary.methods) {
     const MethodSummary* m = summary.find(s.name, method);
     if (!m) continue;
@@ -124,10 +160,17 @@ std::string imagePath(const std::string& folder, const std::string& scene, const
   return fmt::format("{}/images/{}-{}-{}{}.exr", folder, fileName(scene), fileName(method), toString(ladder), mark);
 }
 
+std::string replicatePath(const std::string& folder, const std::string& scene, const std::string& method, Ladder ladder,
+                          double mark, uint64_t seed) {
+  return fmt::format("{}/images/{}-{}-{}{}-seed{}.exr", folder, fileName(scene), fileName(method), toString(ladder),
+                     mark, seed);
+}
+
 std::vector<std::string> writeSweepReport(const std::string& folder, const SweepTable& table,
                                           const SweepSummary& summary, const Json& record, bool plots) {
   std::vector<std::string> warnings, sections;
-  writeText(folder + "/summary.md", "# Sweep\n\n" + toMarkdown(summary));
+  std::vector<ReplicateBias> biases;
+  std::map<std::string, std::string> planned;
   std::string plotWarning;
   for (const std::string& name : summary.scenes) {
     const Json* scene = findScene(record, name);
@@ -135,7 +178,10 @@ std::vector<std::string> writeSweepReport(const std::string& folder, const Sweep
     std::vector<std::string> drawn;
     if (plots) drawn = drawPlots(folder + "/plots", table, summary, name, plotWarning);
     try {
-      ReportScene report = readScene(folder, summary, *scene);
+      planned[name] = scene->value("planned", "");
+      const ReferenceImage reference = readReferenceImage(*scene);
+      for (ReplicateBias& b : replicateBiases(folder, table, summary, name, reference)) biases.push_back(std::move(b));
+      ReportScene report = readScene(folder, summary, *scene, reference.mean);
       report.plots = std::move(drawn);
       sections.push_back(sceneSection(report, table, summary));
     } catch (const Error& e) {
@@ -143,6 +189,18 @@ std::vector<std::string> writeSweepReport(const std::string& folder, const Sweep
     }
   }
   if (!plotWarning.empty()) warnings.push_back(plotWarning);
+  std::string markdown = "# Sweep\n\n" + toMarkdown(summary), overview;
+  if (knowsPapers(summary)) {
+    const std::vector<PaperSection> papers = comparePapers(table, summary, biases, planned);
+    markdown += "\n## Papers\n\n" + toMarkdown(papers);
+    overview += "<h2>What the papers claim, and what was measured</h2>\n" + toHtml(papers);
+  }
+  if (!biases.empty()) {
+    markdown += "\n## Squared bias, from runs with different seeds at the last rung\n\n" + toMarkdown(biases);
+    overview += "<h2>Squared bias, from runs with different seeds at the last rung</h2>\n" + toHtml(biases);
+  }
+  sections.insert(sections.begin(), overview);
+  writeText(folder + "/summary.md", markdown);
   writeText(folder + "/report.html", reportPage(summary, factsOf(record), sections));
   return warnings;
 }

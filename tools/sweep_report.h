@@ -14,6 +14,10 @@ namespace braid {
 std::string imagePath(const std::string& folder, const std::string& scene, const std::string& method, Ladder ladder,
                       double mark);
 
+// The same for the other seeds.
+std::string replicatePath(const std::string& folder, const std::string& scene, const std::string& method, Ladder ladder,
+                          double mark, uint64_t seed);
+
 // `record`: sweep.json. Returns warnings, one line each.
 std::vector<std::string> writeSweepReport(const std::string& folder, const SweepTable& table,
                                           const SweepSummary& summary, const nlohmann::ordered_json& record,

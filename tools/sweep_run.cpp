@@ -8,6 +8,8 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/stopwatch.h"
+#include "renderer/film/error_map.h"
+#include "tools/image_output.h"
 
 namespace braid {
 
@@ -45,18 +47,19 @@ void evaluate(const SweepScene& scene, const SweepJob& job, const SweepJob::Cell
   const Estimate& first = *estimates->find(method.inputs.front().integrator);
   row.spp = first.passes;
   MethodImage made;
-  if (method.finish)
+  if (method.finish) {
     made = method.finish(estimates);
-  else
+  } else {
     made.image = first.mean;
+    if (first.passes > 1) made.error = relativeError(errorMap(first), first.mean);
+  }
   row.denoise = made.denoiseSeconds;
   row.combine = made.combineSeconds;
   if (made.image.empty()) {
     row.values.assign(measurement.columns().size(), std::numeric_limits<double>::quiet_NaN());
     if (callbacks.onObstacle) callbacks.onObstacle(method, made.obstacle);
   } else {
-    row.values =
-        measurement.measure(made.image, scene.reference.image, method.finish ? &first.mean : nullptr, rejected);
+    row.values = measurement.measure(made, scene.reference.image, method.finish ? &first.mean : nullptr, rejected);
   }
   if (callbacks.onRow) callbacks.onRow(row, made.image);
 }
@@ -101,19 +104,21 @@ std::vector<const Metric*> chooseMetrics(const std::vector<std::string>& names) 
 std::vector<std::string> Measurement::columns() const {
   std::vector<std::string> names;
   for (const Metric* m : metrics) names.push_back(m->name);
-  for (const char* name :
-       {"relL2_trimmed", "relL2_unbiased", "better_pixels", "squared_difference", "invalid_pixels", "rejected_samples"})
+  for (const char* name : {"relL2_trimmed", "relL2_unbiased", "estimated_error", "better_pixels", "squared_difference",
+                           "invalid_pixels", "rejected_samples"})
     names.push_back(name);
   return names;
 }
 
-std::vector<double> Measurement::measure(const Rgb<float>& image, const ReferenceImage& reference,
+std::vector<double> Measurement::measure(const MethodImage& made, const ReferenceImage& reference,
                                          const Rgb<float>* baseline, uint64_t rejected) const {
+  const Rgb<float>& image = made.image;
   std::vector<double> values;
   for (const Metric* m : metrics) values.push_back(evaluate(*m, image, reference.mean).value);
   const MetricResult trimmed = evaluate(*findMetric("relL2"), image, reference.mean, 100 * cropWorst);
   values.push_back(trimmed.value);
   values.push_back(relL2Unbiased(image, reference));
+  values.push_back(made.error.value_or(std::numeric_limits<double>::quiet_NaN()));
   Dominance d{std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
   if (baseline) d = dominance(image, *baseline, reference.mean);
   values.push_back(d.betterPixels);

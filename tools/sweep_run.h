@@ -26,11 +26,11 @@ struct Measurement {
   std::vector<const Metric*> metrics;
   double cropWorst = 0.001;  // fraction of the pixels, those with the largest errors, left out of relL2_trimmed
 
-  // Names of the columns: the metrics, then relL2_trimmed, relL2_unbiased, better_pixels, squared_difference,
-  // invalid_pixels and rejected_samples.
+  // Names of the columns: the metrics, then relL2_trimmed, relL2_unbiased, estimated_error (what the method says of
+  // itself, in the units of relL2), better_pixels, squared_difference, invalid_pixels and rejected_samples.
   std::vector<std::string> columns() const;
   // Values of those columns. `baseline`: the mean of the method's first input; null for that mean itself.
-  std::vector<double> measure(const Rgb<float>& image, const ReferenceImage& reference, const Rgb<float>* baseline,
+  std::vector<double> measure(const MethodImage& made, const ReferenceImage& reference, const Rgb<float>* baseline,
                               uint64_t rejected) const;
 };
 
@@ -39,6 +39,7 @@ struct SweepScene {
   std::string name, file;
   std::unique_ptr<Scene> scene;
   CameraData camera;
+  std::string planned;  // the integrators that `auto` keeps for it, joined by '+'
   SweepReference reference;
   double loadSeconds = 0;
 };

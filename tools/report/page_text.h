@@ -13,7 +13,7 @@ h1 { font-size: 1.5em } h2 { font-size: 1.25em; margin-top: 2em; border-bottom: 
 table { border-collapse: collapse; margin: .6em 0; font-variant-numeric: tabular-nums }
 th, td { padding: .2em .7em; text-align: right; border-bottom: 1px solid #e4e4e4; white-space: nowrap }
 th:first-child, td:first-child { text-align: left }
-th { background: #f5f5f5; font-weight: 600 } td.best { font-weight: 700; background: #eaf5ea }
+th { background: #f5f5f5; font-weight: 600 } table.claims td { text-align: left; white-space: normal } td.best { font-weight: 700; background: #eaf5ea }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: .1em 1em; margin: 0 } dt { color: #666 } dd { margin: 0; overflow-wrap: anywhere }
 .wide { overflow-x: auto } .row { display: flex; flex-wrap: wrap; gap: .6em; align-items: flex-start }
 figure { margin: 0 } figcaption { font-size: .85em; color: #555; text-align: center }
