@@ -8,10 +8,17 @@
 // image fades as the render converges.
 //
 // Earlier variances are filtered with the width of the newest, so that the curve of a pixel describes one region.
+//
+// Denoising may stop at some number of passes (in.stopped): d and its error are then those of the noisy image of that
+// time, with the features of now, while n and the curve are the newest. W never exceeds its value at the stop, so that
+// the share of d goes to 0 and the image converges like the noisy one. Variances of later passes may lower W; to let it
+// grow, with its limits or with the noise of the curve, would bring the old image back. A d whose error was taken for
+// much smaller than it is fades only when I is large against the most that W may be.
 #include <algorithm>
 #include <cmath>
 
 #include "combiners/curve_weight.h"
+#include "combiners/curves_stop.h"
 #include "combiners/denoise/variance.h"
 #include "combiners/finite_float.h"
 #include "combiners/registry.h"
@@ -33,8 +40,9 @@ const OptionInfo kMostRatio{"curves-most-ratio", 64, "Most passes that it counts
 constexpr double kFewestPasses = 16;
 constexpr double kRelativeEpsilon = 1e-6;
 
-class Curves : public Method {
+class Curves : public StoppingMethod {
  public:
+  explicit Curves(uint64_t stop = 0) : stop_(stop) {}
   const char* name() const override { return "curves"; }
   const char* description() const override { return "Denoised image that fades as the noisy one converges (SURE)"; }
   MethodKind kind() const override { return MethodKind::Combiner; }
@@ -45,16 +53,23 @@ class Curves : public Method {
     needs.halves = false;
     return needs;
   }
-  std::vector<OptionInfo> options() const override { return {kStep, kSlope, kPoints, kMost, kMostRatio}; }
+  std::vector<OptionInfo> options() const override { return {kStep, kSlope, kPoints, kMost, kMostRatio, kCurvesStop}; }
+  uint64_t stop() const override { return stop_; }
+  std::unique_ptr<Method> stoppedAfter(uint64_t passes) const override {
+    return std::make_unique<Curves>(stopPasses(static_cast<double>(passes)));
+  }
   MethodResult run(const MethodInputs& in) const override;
+
+ private:
+  uint64_t stop_;
 };
 
-// The filtered maps of a blend.
-struct Maps {
-  double passes = 0, sigma = 0;
-  Rgb<float> variance, error, difference;  // v, SURE without negative values, (d - n)²
-  std::vector<double> historyPasses;       // earlier than `passes`, oldest first
-  std::vector<Rgb<float>> history;
+// Filtered variances of an estimate, for the curves of all pixels.
+struct Variances {
+  double passes = 0;
+  Rgb<float> newest;
+  std::vector<double> earlierPasses;  // oldest first
+  std::vector<Rgb<float>> earlier;
 };
 
 Rgb<float> squaredDifference(const Rgb<float>& a, const Rgb<float>& b) {
@@ -65,28 +80,30 @@ Rgb<float> squaredDifference(const Rgb<float>& a, const Rgb<float>& b) {
   return out;
 }
 
-Maps mapsOf(const MethodInputs& in, size_t points) {
-  const Estimate &n = *in.unbiased, &d = *in.biased;
+// SURE of the denoised image of n, filtered, without negative values.
+Rgb<float> errorOf(const MethodInputs& in, const Estimate& n, double sigma) {
   const double step = std::clamp(in.options.number(kStep), 1e-3, 10.0);
-  const Rgb<float> sure = sureMap(n.mean, d.mean, n.variance, in.seed, step, in.redenoise);
-  Maps maps;
-  maps.passes = static_cast<double>(passesOf(n));
-  maps.sigma = mapFilterSigma(n.variance);
-  maps.variance = gaussianFiltered(n.variance, maps.sigma);
-  maps.error = gaussianFiltered(sure, maps.sigma);
-  applySignRule(maps.error, sure, n.variance);
-  maps.difference = gaussianFiltered(squaredDifference(n.mean, d.mean), maps.sigma);
-  if (!in.history || points < 2 || maps.passes < kFewestPasses) return maps;
-  // The last points - 1 states between one pass, which has no variance, and now.
+  const Rgb<float> sure = sureMap(n.mean, in.biased->mean, n.variance, in.seed, step, in.redenoise);
+  Rgb<float> error = gaussianFiltered(sure, sigma);
+  applySignRule(error, sure, n.variance);
+  return error;
+}
+
+Variances variancesOf(const MethodInputs& in, const Estimate& n, double sigma, size_t points) {
+  Variances v;
+  v.passes = static_cast<double>(passesOf(n));
+  v.newest = gaussianFiltered(n.variance, sigma);
+  if (!in.history || points < 2 || v.passes < kFewestPasses) return v;
+  // The last points - 1 states between one pass, which has no variance, and the newest.
   std::vector<const Checkpoint*> kept;
   for (const Checkpoint& k : *in.history)
-    if (k.passes >= 2 && static_cast<double>(k.passes) < maps.passes && k.variance.size() == n.mean.size())
+    if (k.passes >= 2 && static_cast<double>(k.passes) < v.passes && k.variance.size() == n.mean.size())
       kept.push_back(&k);
   for (size_t k = kept.size() - std::min(kept.size(), points - 1); k < kept.size(); ++k) {
-    maps.historyPasses.push_back(static_cast<double>(kept[k]->passes));
-    maps.history.push_back(gaussianFiltered(kept[k]->variance, maps.sigma));
+    v.earlierPasses.push_back(static_cast<double>(kept[k]->passes));
+    v.earlier.push_back(gaussianFiltered(kept[k]->variance, sigma));
   }
-  return maps;
+  return v;
 }
 
 // 10⁻⁶ of the mean variance of a channel.
@@ -99,23 +116,28 @@ double epsilonOf(const Plane<float>& variance) {
   return variance.empty() ? 0 : kRelativeEpsilon * sum / static_cast<double>(variance.size());
 }
 
-// W of all pixels of a channel.
-Plane<float> weightsOf(const Maps& maps, size_t c, const MethodOptions& options, size_t points) {
-  const double slope = std::clamp(options.number(kSlope), -2.0, -0.25), epsilon = epsilonOf(maps.variance[c]);
+// W of all pixels of a channel, for the error of the denoised image.
+Plane<float> weightsOf(const Variances& v, const Rgb<float>& error, size_t c, const MethodOptions& options,
+                       size_t points) {
+  const double slope = std::clamp(options.number(kSlope), -2.0, -0.25), epsilon = epsilonOf(v.newest[c]);
   const WeightLimits limits{std::max(0.0, options.number(kMost)), std::max(0.0, options.number(kMostRatio))};
-  Plane<float> out(maps.variance.width(), maps.variance.height());
+  Plane<float> out(v.newest.width(), v.newest.height());
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    std::vector<CurvePoint> curve(maps.history.size() + 1);
+    std::vector<CurvePoint> curve(v.earlier.size() + 1);
     for (size_t i = begin; i < end; ++i) {
-      for (size_t k = 0; k < maps.history.size(); ++k)
-        curve[k] = {maps.historyPasses[k], static_cast<double>(maps.history[k][c][i])};
-      const CurvePoint now{maps.passes, static_cast<double>(maps.variance[c][i])};
+      for (size_t k = 0; k < v.earlier.size(); ++k)
+        curve[k] = {v.earlierPasses[k], static_cast<double>(v.earlier[k][c][i])};
+      const CurvePoint now{v.passes, static_cast<double>(v.newest[c][i])};
       curve.back() = now;
-      out[i] = finiteFloat(
-          denoisedWeight(curve, now, static_cast<double>(maps.error[c][i]), epsilon, slope, points, limits));
+      out[i] =
+          finiteFloat(denoisedWeight(curve, now, static_cast<double>(error[c][i]), epsilon, slope, points, limits));
     }
   });
   return out;
+}
+
+void limitTo(Plane<float>& plane, const Plane<float>& most) {
+  for (size_t i = 0; i < plane.size(); ++i) plane[i] = std::min(plane[i], most[i]);
 }
 
 // The squared error of n + a (d - n): (1 - a)² v + a² m + 2 a (1 - a) q, where q, the covariance of both errors, is
@@ -127,10 +149,15 @@ double blendError(double v, double m, double difference, double a) {
 
 // The halves take the weights of the whole image, where both inputs have halves.
 MethodResult Curves::run(const MethodInputs& in) const {
-  const Estimate &n = *in.unbiased, &d = *in.biased;
+  const Estimate &n = *in.unbiased, &d = *in.biased, &source = in.stopped ? *in.stopped : n;
   if (!in.redenoise) throw Error(ExitCode::Usage, "needs a denoiser that it can run again as its biased input");
   const auto points = static_cast<size_t>(std::clamp(in.options.number(kPoints), 0.0, 8.0));
-  const Maps maps = mapsOf(in, points);
+  const double sigma = mapFilterSigma(source.variance);
+  const Rgb<float> error = errorOf(in, source, sigma);
+  const Rgb<float> difference = gaussianFiltered(squaredDifference(n.mean, d.mean), sigma);
+  const Variances now = variancesOf(in, n, sigma, points);
+  Variances atStop;
+  if (in.stopped) atStop = variancesOf(in, source, sigma, points);
   const int width = n.mean.width(), height = n.mean.height();
   MethodResult result;
   result.image.mean = Rgb<float>(width, height);
@@ -139,36 +166,38 @@ MethodResult Curves::run(const MethodInputs& in) const {
   result.error = Plane<float>(width, height);
   Plane<float> share(width, height);
   for (size_t c = 0; c < 3; ++c) {
-    const Plane<float> weight = weightsOf(maps, c, in.options, points);
+    Plane<float> weight = weightsOf(now, error, c, in.options, points);
+    if (in.stopped) limitTo(weight, weightsOf(atStop, error, c, in.options, points));
     parallelChunks(weight.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
-        const double w = static_cast<double>(weight[i]), a = w / (maps.passes + w);
+        const double w = static_cast<double>(weight[i]), a = w / (now.passes + w);
         const auto blend = [a](float x, float y) {
           return finiteFloat((1 - a) * static_cast<double>(x) + a * static_cast<double>(y));
         };
         result.image.mean[c][i] = blend(n.mean[c][i], d.mean[c][i]);
         for (int h = 0; halves && h < 2; ++h) result.image.half[h][c][i] = blend(n.half[h][c][i], d.half[h][c][i]);
         result.error[i] +=
-            finiteFloat(blendError(static_cast<double>(maps.variance[c][i]), static_cast<double>(maps.error[c][i]),
-                                   static_cast<double>(maps.difference[c][i]), a) /
+            finiteFloat(blendError(static_cast<double>(now.newest[c][i]), static_cast<double>(error[c][i]),
+                                   static_cast<double>(difference[c][i]), a) /
                         3);
         share[i] += static_cast<float>(a / 3);
       }
     });
   }
   result.aovs.push_back({"weight.curves", std::move(share)});
-  Attribute sigma, used;
-  sigma.name = "mapFilterSigma";
-  sigma.kind = Attribute::Kind::Float;
-  sigma.number = maps.sigma;
-  used.name = "curvePoints";
-  used.kind = Attribute::Kind::Int;
-  used.integer = static_cast<int64_t>(maps.history.size() + 1);
-  result.remarks = {sigma, used};
+  using Kind = Attribute::Kind;
+  result.remarks = {{"mapFilterSigma", Kind::Float, "", 0, sigma, {}},
+                    {"curvePoints", Kind::Int, "", static_cast<int64_t>(now.earlier.size() + 1), 0, {}}};
+  if (in.stopped) result.remarks.push_back({"stoppedAfter", Kind::Int, "", static_cast<int64_t>(source.passes), 0, {}});
   return result;
 }
 
 }  // namespace
+
+uint64_t stopPasses(double number) {
+  constexpr double kFewest = 2, kMost = 1e12;
+  return number >= 1 ? static_cast<uint64_t>(std::clamp(number, kFewest, kMost)) : 0;
+}
 
 std::unique_ptr<Method> make_curves() { return std::make_unique<Curves>(); }
 

@@ -91,6 +91,8 @@ std::vector<Spike> findSpikes(const Rgb<float>& image, const Estimate& unbiased,
       const double value = brightness(image, i);
       if (n.weight < 1e-6 || value <= n.brightest) continue;
       const double mean = (n.mean[0] + n.mean[1] + n.mean[2]) / (3 * n.weight);
+      // On the rim of a lamp no neighbour is of the same surface, and the others may be brighter.
+      if (value <= mean) continue;
       if (darkHalf(unbiased, i) - mean >= kQuarterShare * (value - mean)) continue;
       Spectrum replacement{0};
       for (size_t c = 0; c < 3; ++c) replacement[static_cast<int>(c)] = finiteFloat(n.mean[c] / n.weight);

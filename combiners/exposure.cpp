@@ -139,7 +139,10 @@ SanitiseReport sanitise(Estimates& all) {
   SanitiseReport report;
   for (Estimate& e : all.estimates) report = report + sanitise(e);
   for (auto& [name, checkpoints] : all.history)
-    for (Checkpoint& c : checkpoints) cleanVariance(c.variance, report);
+    for (Checkpoint& c : checkpoints) {
+      cleanVariance(c.variance, report);
+      for (Rgb<float>* image : {&c.mean, &c.half[0], &c.half[1]}) cleanValues(*image, report);
+    }
   if (all.features) {
     cleanFeature(all.features->albedo, report);
     cleanFeature(all.features->normal, report);
@@ -157,7 +160,10 @@ uint64_t limitRange(Estimates& all) {
     for (Rgb<float>* variance : {&e.variance, &e.biasVariance}) moved += limit(*variance, kLargest * kLargest);
   }
   for (auto& [name, checkpoints] : all.history)
-    for (Checkpoint& c : checkpoints) moved += limit(c.variance, kLargest * kLargest);
+    for (Checkpoint& c : checkpoints) {
+      moved += limit(c.variance, kLargest * kLargest);
+      for (Rgb<float>* image : {&c.mean, &c.half[0], &c.half[1]}) moved += limit(*image, kLargest);
+    }
   if (all.features)
     moved += limitFeature(all.features->albedo) + limitFeature(all.features->normal) +
              limitFeature(all.features->depth) + limitFeature(all.features->visibility);
@@ -173,7 +179,10 @@ void scaleExposure(Estimate& e, double k) {
 void scaleExposure(Estimates& all, double k) {
   for (Estimate& e : all.estimates) scaleExposure(e, k);
   for (auto& [name, checkpoints] : all.history)
-    for (Checkpoint& c : checkpoints) multiply(c.variance, k * k);
+    for (Checkpoint& c : checkpoints) {
+      multiply(c.variance, k * k);
+      for (Rgb<float>* image : {&c.mean, &c.half[0], &c.half[1]}) multiply(*image, k);
+    }
 }
 
 void scaleExposure(MethodResult& result, double k) {

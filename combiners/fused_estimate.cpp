@@ -2,6 +2,7 @@
 #include "combiners/fused_estimate.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "combiners/box_mean.h"
 #include "combiners/channel_mean.h"
@@ -33,7 +34,9 @@ WeightMaps inverseErrorWeights(const std::vector<Plane<float>>& errors) {
 
 // Raises E_u where the unbiased image is darker than the photon map over a whole window: rare paths have not been found
 // there, and a variance knows nothing of samples that never came. The difference D of the window means must be beyond
-// the photon map's error and three deviations of the unbiased mean; then D² is the error.
+// the photon map's error and three deviations of the unbiased mean; these are added as roots, for the former may be a
+// bias, of which noise takes nothing away. Then D² - E_b is the squared error that E_b does not explain. D² would count
+// it twice, which a photon map that is far off and says so turns into half of its image.
 void countMissingLight(Plane<float>& error, const Estimate& unbiased, const Rgb<float>& variance,
                        const Estimate& biased, const Plane<float>& biasedError) {
   const auto value = [](const Rgb<float>& image) {
@@ -44,9 +47,9 @@ void countMissingLight(Plane<float>& error, const Estimate& unbiased, const Rgb<
   const Plane<double> v = boxMean(channelMean(variance, value(variance)), kRadius);
   const double pixels = (2.0 * kRadius + 1) * (2.0 * kRadius + 1);
   for (size_t i = 0; i < error.size(); ++i) {
-    const double missing = s[i] - x[i];
-    if (missing > 0 && missing * missing > static_cast<double>(biasedError[i]) + 9 * v[i] / pixels)
-      error[i] = std::max(error[i], finiteFloat(missing * missing));
+    const double missing = s[i] - x[i], explained = static_cast<double>(biasedError[i]);
+    if (missing > std::sqrt(explained) + 3 * std::sqrt(v[i] / pixels))
+      error[i] = std::max(error[i], finiteFloat(missing * missing - explained));
   }
 }
 

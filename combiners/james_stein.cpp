@@ -3,6 +3,13 @@
 // alpha is 1/2. The unbiased image is pulled, block by block, towards a biased image that was first fitted to it by a
 // crossed half-buffer regression.
 //
+// The paper counts on its never being worse than the unbiased image, which holds where the noise of a block is even.
+// Beside lamps, highlights and outliers it is not. So lone outliers are replaced first (js-gate): over 14 scenes at 8
+// to 256 samples, towards pw, 5 of 56 cases are worse than the unbiased image instead of 11, the worst by 1.3x instead
+// of 8.9x, and the mean gain is 5.6x instead of 4.1x. A constant of 1.25 is a little worse in all of these than the
+// paper's
+// 1. The variance of each pixel (js-variance 3) loses least, 3 cases and 1.17x without the gate, but gains only 1.6x.
+//
 // Halves of the result. With js-regression the half h is JS(X^h, its variance, own fit of half h): the halves share the
 // bandwidth kappa and the variance of all samples, but no pixel values, so that errors can be measured across them.
 // Their mean is not the result, whose Y* is crossed and whose factors come from all samples. Without js-regression half
@@ -19,7 +26,7 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kConstant{"js-constant", 1.25,
+const OptionInfo kConstant{"js-constant", 1,
                            "Shrinkage relative to the papers' p - 2; below 2, it beats the unbiased image"};
 const OptionInfo kRegression{"js-regression", 1,
                              "1: fit the biased image to the unbiased one first, 0: use it as it is"};
@@ -29,7 +36,7 @@ const OptionInfo kCrossed{"js-crossed", 0, "1: combine each half with the fit of
 const OptionInfo kGlobal{"js-global", 0, "1: one factor for the whole image"};
 const OptionInfo kPositivePart{"js-positive-part", 1, "0: let factors be negative"};
 const OptionInfo kStride{"js-stride", 4, "Distance of the regression models in pixels"};
-const OptionInfo kGate{"js-gate", 0, "1: replace lone outliers of the unbiased image first"};
+const OptionInfo kGate{"js-gate", 1, "1: replace lone outliers of the unbiased image first"};
 
 // The images that X, X^A and X^B are pulled towards.
 struct Targets {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "combiners/pipeline.h"
 
+#include <map>
 #include <set>
 
 #include <fmt/format.h>
@@ -50,6 +51,8 @@ class Runner {
   Runner(const Estimates& estimates, const PipelineOptions& options) : all_(estimates), options_(options) {}
 
   void normalise(const std::string& unbiased);
+  // Makes estimates of the earlier images that steps read.
+  void keepEarlier(const Recipe& recipe);
   void run(Step step);
   // Back to the units of the estimates.
   void finish();
@@ -62,7 +65,10 @@ class Runner {
   std::string missingInput(const Step& step) const;
   double inputSeconds(const Step& step) const;
 
-  Estimates all_;  // sanitised and normalised; so are the results until finish()
+  using Earlier = std::pair<std::string, uint64_t>;  // name, passes
+
+  Estimates all_;                        // sanitised and normalised; so are the results until finish()
+  std::map<Earlier, Estimate> earlier_;  // images of checkpoints
   const PipelineOptions& options_;
 };
 
@@ -72,6 +78,24 @@ void Runner::normalise(const std::string& unbiased) {
   result.exposure = options_.exposure > 0 ? options_.exposure : e ? exposureScale(e->mean) : 1.0;
   scaleExposure(all_, result.exposure);
   result.sanitised.outOfRange = limitRange(all_);
+}
+
+void Runner::keepEarlier(const Recipe& recipe) {
+  for (const Step& step : recipe.steps) {
+    const Estimate* newest = step.kept > 0 ? all_.find(step.unbiased) : nullptr;
+    if (!newest || earlier_.count({step.unbiased, step.kept})) continue;
+    for (const Checkpoint& c : all_.history[step.unbiased]) {
+      if (c.passes != step.kept || c.mean.empty()) continue;
+      Estimate e;
+      e.name = newest->name;
+      e.passes = c.passes;
+      e.seconds = c.seconds;
+      e.mean = c.mean;
+      for (size_t h = 0; h < 2; ++h) e.half[h] = c.half[h];
+      e.variance = c.variance;
+      earlier_[{step.unbiased, step.kept}] = std::move(e);
+    }
+  }
 }
 
 const Estimate* Runner::estimate(const std::string& name) const {
@@ -108,6 +132,10 @@ MethodInputs Runner::inputsOf(const Step& step) const {
   in.options = options_.numbers;
   in.options.set(kPipelineExposure.name, result.exposure);
   in.cancel = options_.cancel;
+  if (step.kept > 0) {
+    const Estimate* earlier = &earlier_.at({step.unbiased, step.kept});
+    (step.method->kind() == MethodKind::Denoiser ? in.unbiased : in.stopped) = earlier;
+  }
   const PipelineOutput* maker = result.find(step.biased);
   if (maker && maker->step.method->kind() == MethodKind::Denoiser) {
     const MethodInputs again = inputsOf(maker->step);
@@ -142,15 +170,16 @@ void Runner::run(Step step) {
   PipelineOutput out;
   if (step.obstacle.empty()) step.obstacle = missingInput(step);
   if (step.obstacle.empty()) {
+    const MethodInputs in = inputsOf(step);
     const Stopwatch clock;
     try {
-      out.result = step.method->run(inputsOf(step));
+      out.result = step.method->run(in);
     } catch (const Error& e) {
       step.obstacle = e.what();
     }
     out.seconds = clock.seconds();
     out.inputSeconds = inputSeconds(step);
-    const Estimate* unbiased = estimate(step.unbiased);
+    const Estimate* unbiased = in.unbiased;
     Estimate& image = out.result.image;
     image.name = step.name;
     image.unbiased = false;
@@ -192,6 +221,7 @@ PipelineResult runPipeline(const Estimates& estimates, const std::vector<std::st
   for (const Step& step : recipe.steps)
     if (unbiased.empty()) unbiased = step.unbiased;
   runner.normalise(unbiased);
+  runner.keepEarlier(recipe);
   for (const Step& step : recipe.steps) runner.run(step);
   runner.finish();
   return std::move(runner.result);

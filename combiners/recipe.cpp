@@ -2,11 +2,14 @@
 #include "combiners/recipe.h"
 
 #include <algorithm>
+#include <bit>
+#include <charconv>
 #include <filesystem>
 #include <set>
 
 #include <fmt/format.h>
 
+#include "combiners/curves_stop.h"
 #include "combiners/outside_method.h"
 #include "combiners/registry.h"
 #include "renderer/core/error.h"
@@ -21,10 +24,11 @@ constexpr const char* kPreferredDenoisers[] = {"oidn", "nfor", "rdfc", "pw", "nl
 // Severely biased on purpose; never chosen by itself.
 constexpr const char* kStressInput = "box";
 
-// "name@biased" cut at the first '@' that is no part of a parameter.
+// "name@biased" cut at the first '@' that is no part of a parameter, which a number never has.
 std::pair<std::string, std::string> splitChain(const std::string& name) {
-  const size_t at = name.find('@');
-  if (at == std::string::npos || name.find(':') < at) return {name, ""};
+  const size_t at = name.find('@'), colon = name.find(':');
+  if (at == std::string::npos) return {name, ""};
+  if (colon < at && name.find_first_not_of("0123456789", colon + 1) != at) return {name, ""};
   return {name.substr(0, at), name.substr(at + 1)};
 }
 
@@ -47,6 +51,8 @@ class RecipeMaker {
 
   // Adds the steps of a method, or reports that the name is an estimate's. Returns why it cannot be an input.
   std::string add(const std::string& name);
+  // Takes out the denoisers of newest images that only stopped methods asked for.
+  void dropReplaced(const std::vector<std::string>& wanted);
 
   Recipe recipe;
 
@@ -56,13 +62,14 @@ class RecipeMaker {
   std::string fillCorrelated(Step& step);
   std::string fillBiased(Step& step, const std::string& chosen);
   std::string fillBases(Step& step, const std::string& chosen);
+  void fillStop(Step& step);
   std::string defaultBiased(const Needs& needs);
   std::vector<std::string> denoisersInOrder() const;
   std::string lacks(const std::string& estimate, const Needs& needs, bool unbiased) const;
 
   const Facts& facts_;
   const RecipeOptions& options_;
-  std::set<std::string> inProgress_;
+  std::set<std::string> inProgress_, replaced_;
 };
 
 std::string RecipeMaker::add(const std::string& name) {
@@ -90,6 +97,7 @@ void RecipeMaker::fill(Step& step, const std::string& chosen) {
   if (step.obstacle.empty() && !needs.biased && !takesBases && !chosen.empty())
     step.obstacle = "it takes no biased input";
   if (step.obstacle.empty() && takesBases) step.obstacle = fillBases(step, needs.biased ? "" : chosen);
+  if (step.obstacle.empty()) fillStop(step);
 }
 
 // What an estimate lacks for the needs, or nothing.
@@ -214,11 +222,54 @@ std::string RecipeMaker::fillBases(Step& step, const std::string& chosen) {
   return {};
 }
 
+void RecipeMaker::fillStop(Step& step) {
+  const auto* stopping = dynamic_cast<const StoppingMethod*>(step.method.get());
+  if (!stopping) return;
+  step.stop = stopping->stop() > 0 ? stopping->stop() : options_.stop;
+  const EstimateFacts* e = facts_.find(step.unbiased);
+  const Step* newest = recipe.find(step.biased);
+  if (step.stop == 0 || !e || !newest || newest->unbiased != step.unbiased) return;
+  const auto kept = std::lower_bound(e->kept.begin(), e->kept.end(), step.stop);
+  if (kept == e->kept.end()) {
+    if (e->passes > std::bit_ceil(step.stop))
+      step.note = fmt::format("denoises the newest image: that of {} after {} passes was not kept", e->name, step.stop);
+    return;
+  }
+  if (*kept >= e->passes) return;  // it is the newest
+  Step earlier = *newest;
+  earlier.name = fmt::format("{}-stop{}", newest->name, *kept);
+  earlier.kept = step.kept = *kept;
+  replaced_.insert(newest->name);
+  step.biased = earlier.name;
+  if (!recipe.find(earlier.name)) recipe.steps.push_back(std::move(earlier));
+}
+
+void RecipeMaker::dropReplaced(const std::vector<std::string>& wanted) {
+  for (const std::string& name : wanted) replaced_.erase(name);
+  for (const std::string& name : options_.denoisers) replaced_.erase(name);
+  for (const Step& step : recipe.steps) {
+    replaced_.erase(step.biased);
+    for (const std::string& base : step.bases) replaced_.erase(base);
+  }
+  std::erase_if(recipe.steps, [&](const Step& step) { return replaced_.count(step.name) > 0; });
+}
+
 // Estimates of a file that earlier runs of methods made give way to the methods of their names.
 Facts withoutMethods(const Facts& facts) {
   Facts kept = facts;
   std::erase_if(kept.estimates, [](const EstimateFacts& e) { return isMethod(e.name); });
   return kept;
+}
+
+// The method for what follows the colon.
+std::unique_ptr<Method> withStop(const StoppingMethod& method, const std::string& full, size_t begin) {
+  uint64_t passes = 0;
+  const char *at = full.data() + begin, *end = full.data() + full.size();
+  const auto [next, error] = std::from_chars(at, end, passes);
+  if (at == end || error != std::errc() || next != end || passes == 0)
+    throw Error(ExitCode::Usage, fmt::format("{}: expected {}:PASSES, after which denoising stops, such as {}:128",
+                                             full, method.name(), method.name()));
+  return method.stoppedAfter(passes);
 }
 
 std::string knownMethods() {
@@ -240,9 +291,14 @@ Facts factsOf(const Estimates& all) {
   facts.features = all.features.has_value();
   for (const Estimate& e : all.estimates) {
     const auto history = all.history.find(e.name);
+    std::vector<uint64_t> kept;
+    if (history != all.history.end())
+      for (const Checkpoint& c : history->second)
+        if (!c.mean.empty() && c.passes >= 2) kept.push_back(c.passes);
     facts.estimates.push_back({e.name, e.unbiased, e.correlation, e.passes, !e.half[0].empty() && !e.half[1].empty(),
                                !e.variance.empty(), e.quarter.size() == 4 && (e.passes == 0 || e.passes >= 4),
-                               history == all.history.end() ? 0 : static_cast<int>(history->second.size())});
+                               history == all.history.end() ? 0 : static_cast<int>(history->second.size()),
+                               std::move(kept)});
   }
   return facts;
 }
@@ -258,6 +314,7 @@ Recipe makeRecipe(const Facts& facts, const std::vector<std::string>& wanted, co
   RecipeMaker maker(kept, options);
   for (const std::string& name : options.denoisers) maker.add(name);
   for (const std::string& name : wanted) maker.add(name);
+  maker.dropReplaced(wanted);
   return std::move(maker.recipe);
 }
 
@@ -269,7 +326,10 @@ RecipeNeeds needsOf(const Recipe& recipe) {
     all.quarters |= needs.quarters || needs.quartersHelp;
     all.features |= needs.features;
     all.checkpoints = std::max(all.checkpoints, needs.checkpoints);
+    if (step.stop > 0) all.stops.push_back(step.stop);
   }
+  std::sort(all.stops.begin(), all.stops.end());
+  all.stops.erase(std::unique(all.stops.begin(), all.stops.end()), all.stops.end());
   return all;
 }
 
@@ -285,7 +345,10 @@ std::shared_ptr<const Method> findMethod(const std::string& full) {
     if (name != m->name()) continue;
     if (colon == std::string::npos) return std::shared_ptr<const Method>(std::move(m));
     const auto* outside = dynamic_cast<const OutsideMethod*>(m.get());
-    auto made = outside ? outside->with(full.substr(colon + 1)) : nullptr;
+    const auto* stopping = dynamic_cast<const StoppingMethod*>(m.get());
+    auto made = outside    ? outside->with(full.substr(colon + 1))
+                : stopping ? withStop(*stopping, full, colon + 1)
+                           : nullptr;
     if (!made) throw Error(ExitCode::Usage, fmt::format("{}: {} takes no parameter after a colon", full, name));
     return std::shared_ptr<const Method>(std::move(made));
   }

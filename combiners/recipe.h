@@ -2,10 +2,11 @@
 // Decides, from what there is, which denoisers and combiners run on what and in which order: a pure function that a
 // plan prints before a render and that the pipeline executes after it. What cannot run says why in one sentence.
 //
-// A method is named by its name in the registry. Two forms add to it:
+// A method is named by its name in the registry. Three forms add to it:
 //   name:parameter   a method that takes a parameter, such as external:FILE; the rest of the text is the parameter
 //   name@biased      the method with this biased input instead of the default one, such as js@ensemble; the input may
 //                    itself have an input: js@easy@nfor
+//   name:passes      a method that stops denoising, such as curves:128 (combiners/curves_stop.h)
 //
 // Names of methods go before names of estimates: an image that a file holds from an earlier run of a method is not used
 // under that method's name.
@@ -20,6 +21,10 @@
 //   bases       after '@' with '+' between them, as in ensemble@nfor+rdfc; or as named for all; or else the denoisers
 //               asked for and, when they are too few, all denoisers that run but box; and for methods that want them
 //               the biased estimates.
+//
+// Where denoising stops: a method after its stop, if the image of then was kept, gets a step of its own for its
+// denoiser, called like nfor-stop128, which reads that image; the denoiser does not run on the newest image unless it
+// has to for others.
 #pragma once
 
 #include <memory>
@@ -35,6 +40,7 @@ struct RecipeOptions {
   std::string unbiased, correlated, biased;
   std::vector<std::string> bases;
   std::vector<std::string> denoisers;  // asked for, in this order
+  uint64_t stop = 0;                   // passes after which methods that can stop denoising do; 0: never
 };
 
 // What is known of an estimate without its pixels.
@@ -45,6 +51,7 @@ struct EstimateFacts {
   uint64_t passes = 0;  // 0: not known
   bool halves = true, variance = true, quarters = false;
   int checkpoints = 0;
+  std::vector<uint64_t> kept{};  // passes of the checkpoints with their image, rising
 };
 
 struct Facts {
@@ -61,6 +68,11 @@ struct Step {
   std::string unbiased, biased, correlated;
   std::vector<std::string> bases;
   std::string obstacle;  // why it cannot run, in one sentence; empty: it can
+  uint64_t stop = 0;     // passes after which the biased input is not denoised anew; 0: never
+  // Passes of the earlier image that a denoiser reads in place of the newest, and whose denoised image a combiner
+  // reads; 0: none.
+  uint64_t kept = 0;
+  std::string note;  // what a user should know although it runs, in one sentence; mostly empty
 };
 
 struct Recipe {
@@ -76,6 +88,7 @@ Recipe makeRecipe(const Facts& facts, const std::vector<std::string>& wanted, co
 struct RecipeNeeds {
   bool quarters = false, features = false;
   int checkpoints = 0;
+  std::vector<uint64_t> stops{};  // passes after which the image is kept, rising
 };
 RecipeNeeds needsOf(const Recipe& recipe);
 

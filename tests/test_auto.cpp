@@ -217,6 +217,25 @@ TEST_CASE("An outlier in one quarter is replaced, a lamp in all of them stays") 
   CHECK(findSpikes(x.mean, x, x.variance, nullptr).empty());
 }
 
+TEST_CASE("The rim of a lamp, darker than the lamp and noisier than all around it, stays as it is") {
+  // The lamp's pixels are brighter, without noise and of another surface than the rim and the wall.
+  Estimate x = flat(0.5f, 1e-8f);
+  Features features;
+  for (FeaturePlanes<Rgb<float>>* f : {&features.albedo, &features.normal}) {
+    f->mean = Rgb<float>(40, 30, 0.0f);
+    f->half[0] = f->half[1] = f->mean;
+  }
+  for (int y = 10; y < 20; ++y)
+    for (int u = 10; u < 20; ++u) {
+      const size_t i = x.mean[0].index(u, y);
+      const bool rim = u == 10 || u == 19 || y == 10 || y == 19;
+      const float value = rim ? 0.9f : 1.4f;
+      setPixel(x, i, value, {value - 0.005f, value + 0.005f, value, value}, rim && (u + y) % 7 == 0 ? 2e-5f : 1e-8f);
+      for (size_t c = 0; c < 3; ++c) features.albedo.mean[c][i] = rim ? 0.5f : 1.0f;
+    }
+  CHECK(findSpikes(x.mean, x, x.variance, &features).empty());
+}
+
 TEST_CASE("A noisy lamp lends the dark pixels around it no error that they cannot have") {
   Estimate x = flat(0.01f, 1e-8f);
   const size_t lamp = x.mean[0].index(20, 15);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every registered integrator promises. A new one is covered by being in the registry.
 #include <chrono>
+#include <ctime>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -282,19 +283,20 @@ TEST_CASE("A render ends soon after it is told to, and keeps the passes that are
     CHECK(onePass.estimates->estimates[0].passes == 1);
 
     stop = false;
-    std::chrono::steady_clock::time_point told;
+    std::clock_t told = 0;
     std::thread user([&] {
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
-      told = std::chrono::steady_clock::now();
+      told = std::clock();
       stop = true;
     });
     const RenderResult r = Session(scene, plan).run({}, nullptr, &stop);
-    const auto ended = std::chrono::steady_clock::now();
+    const std::clock_t ended = std::clock();
     user.join();
     CHECK((r.reason == StopReason::Cancelled));
     CHECK(r.estimates->estimates[0].passes == r.rounds);
-    // Without a limit of samples it would never end; the bound is generous for busy machines.
-    CHECK(ended - told < std::chrono::seconds(5));
+    // Without a limit of samples it would never end. In seconds of all processors, which other programs do not slow
+    // down; sanitizers do.
+    CHECK(ended - told < 10 * CLOCKS_PER_SEC);
   }
 }
 

@@ -64,7 +64,7 @@ SweepMethod boxMethod() {
   m.inputs = {{"pt", 1}};
   m.finish = [](const std::shared_ptr<const Estimates>& estimates) {
     const Rgb<float>& in = estimates->find("pt")->mean;
-    MethodImage out{Rgb<float>(in.width(), in.height()), 0.25, 0.125, ""};
+    MethodImage out{Rgb<float>(in.width(), in.height()), 0.25, 0.125, "", {}};
     for (int y = 0; y < in.height(); ++y)
       for (int x = 0; x < in.width(); ++x)
         for (size_t c = 0; c < 3; ++c) {

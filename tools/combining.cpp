@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "combiners/curves_stop.h"
 #include "combiners/registry.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
@@ -53,6 +54,7 @@ PipelineOptions CombineChoice::options(const std::atomic<bool>* cancel) const {
   const std::vector<OptionInfo> infos = allMethodOptions();
   for (size_t i = 0; i < numbers.size() && i < infos.size(); ++i)
     if (!std::isnan(numbers[i])) o.numbers.set(infos[i].name, numbers[i]);
+  o.roles.stop = stopPasses(o.numbers.number(kCurvesStop));
   return o;
 }
 
@@ -97,6 +99,9 @@ Recipe planCombining(const Scene& scene, const CameraData& camera, Settings& set
   settings.quarters |= needs.quarters;
   settings.features |= needs.features;
   settings.history |= needs.checkpoints > 0;
+  settings.stops.insert(settings.stops.end(), needs.stops.begin(), needs.stops.end());
+  std::sort(settings.stops.begin(), settings.stops.end());
+  settings.stops.erase(std::unique(settings.stops.begin(), settings.stops.end()), settings.stops.end());
   return recipe;
 }
 
@@ -137,7 +142,8 @@ CombinedLayers::CombinedLayers(const PipelineResult& result, const std::vector<s
     if (!out.ran()) continue;
     const std::vector<Attribute> remarks = remarksOf(out, timing);
     estimates.attributes.insert(estimates.attributes.end(), remarks.begin(), remarks.end());
-    if (out.step.method->kind() == MethodKind::Denoiser) {
+    // An image of fewer passes would be taken for that of all in the file.
+    if (out.step.method->kind() == MethodKind::Denoiser && out.step.kept == 0) {
       Estimate e = out.result.image;
       e.name = layerName(out.step.name);
       std::erase_if(estimates.estimates, [&](const Estimate& old) { return old.name == e.name; });
@@ -196,8 +202,10 @@ std::vector<std::string> combineWarnings(const PipelineResult& result) {
         fmt::format("inputs of combiners: {} values that were not finite and {} negative variances count as "
                     "0, {} values were limited",
                     s.nonFinite, s.negativeVariance, s.outOfRange));
-  for (const PipelineOutput& out : result.outputs)
+  for (const PipelineOutput& out : result.outputs) {
     if (!out.ran()) lines.push_back(fmt::format("{} did not run: {}", out.step.name, out.step.obstacle));
+    if (!out.step.note.empty()) lines.push_back(fmt::format("{} {}", out.step.name, out.step.note));
+  }
   return lines;
 }
 

@@ -36,7 +36,7 @@ void addCombineOptions(CLI::App& command, CombineChoice& choice);
 std::string methodList();
 
 // The steps that will run after a render with these settings; the settings get what the steps need to be kept:
-// quarters, features, history. Throws Error(Usage) for unknown names.
+// quarters, features, history, images for the stop of denoising. Throws Error(Usage) for unknown names.
 Recipe planCombining(const Scene& scene, const CameraData& camera, Settings& settings,
                      const std::vector<const Integrator*>& integrators, const CombineChoice& choice);
 

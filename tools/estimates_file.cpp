@@ -50,7 +50,6 @@ std::vector<std::string> estimateNames(const ImageFile& file) {
   return names;
 }
 
-// The variances after 1, 2, 4, … passes, from layers <name>.variance<passes>.
 // The passes N of the layers <layer>.varianceN, in rising order.
 std::set<uint64_t> checkpointPasses(const ImageFile& file, const std::string& layer) {
   const std::string prefix = layer + ".variance", suffix = ".R";
@@ -64,12 +63,17 @@ std::set<uint64_t> checkpointPasses(const ImageFile& file, const std::string& la
   return passes;
 }
 
+// The variances after 1, 2, 4, … passes, from layers <name>.variance<passes>, and the images where there are some.
 std::vector<Checkpoint> readHistory(const ImageFile& file, const std::string& layer, double secondsPerPass) {
   std::vector<Checkpoint> history;
   for (const uint64_t passes : checkpointPasses(file, layer)) {
-    Rgb<float> variance = layerOrNone(file, layer + ".variance" + std::to_string(passes));
-    if (!variance.empty())
-      history.push_back({passes, secondsPerPass * static_cast<double>(passes), std::move(variance)});
+    const auto read = [&, n = std::to_string(passes)](const char* part) { return layerOrNone(file, layer + part + n); };
+    Checkpoint c{passes, secondsPerPass * static_cast<double>(passes), read(".variance")};
+    if (c.variance.empty()) continue;
+    c.mean = read(".mean");
+    c.half[0] = read(".halfA");
+    c.half[1] = read(".halfB");
+    history.push_back(std::move(c));
   }
   return history;
 }

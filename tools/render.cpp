@@ -98,6 +98,7 @@ void keepAsBefore(const FilmState& state, Settings& settings) {
   settings.features |= state.features.has_value();
   for (const StateOption& option : state.identity.options)
     settings.history |= option == StateOption{"keeping history", "on"};
+  settings.stops = stopsOf(state.identity);
 }
 
 // What has to be kept for combining the passes of all machines, of which a share has few.
@@ -109,6 +110,7 @@ Recipe planCombiningOfAll(const Scene& scene, const CameraData& camera, Settings
   settings.quarters = all.quarters;
   settings.features = all.features;
   settings.history = all.history;
+  settings.stops = all.stops;
   return recipe;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/sweep_error.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -46,6 +47,37 @@ double relativeMean(const ReferenceImage& reference, const Rgb<float>& image, co
   return sum.invalid > 0 ? std::numeric_limits<double>::infinity() : sum.mean();
 }
 
+// Standard error of the same mean, from the scatter of the means of blocks; of a product that is not finite, none.
+template <class Product>
+double blockStandardError(const ReferenceImage& reference, const Product& product) {
+  constexpr int kBlock = 16;
+  const Rgb<float>&a = reference.half[0], &b = reference.half[1];
+  double sum = 0, squares = 0, blocks = 0;
+  for (int y0 = 0; y0 < a.height(); y0 += kBlock)
+    for (int x0 = 0; x0 < a.width(); x0 += kBlock) {
+      double block = 0, pixels = 0;
+      for (int y = y0; y < std::min(a.height(), y0 + kBlock); ++y)
+        for (int x = x0; x < std::min(a.width(), x0 + kBlock); ++x) {
+          const size_t i = a[0].index(x, y);
+          double level = 0, error = 0;
+          for (size_t c = 0; c < 3; ++c) {
+            level += 0.5 * (at(a, c, i) + at(b, c, i)) / 3;
+            error += product(c, i) / 3;
+          }
+          const double value = error / (sqr(level) + 0.01);
+          if (!std::isfinite(value)) continue;
+          block += value;
+          ++pixels;
+        }
+      if (pixels == 0) continue;
+      sum += block / pixels;
+      squares += sqr(block / pixels);
+      ++blocks;
+    }
+  if (blocks < 2) return std::numeric_limits<double>::quiet_NaN();
+  return std::sqrt(std::max(0.0, squares / blocks - sqr(sum / blocks)) / (blocks - 1));
+}
+
 }  // namespace
 
 double relL2Unbiased(const Rgb<float>& image, const ReferenceImage& reference) {
@@ -57,13 +89,14 @@ double relL2Unbiased(const Rgb<float>& image, const ReferenceImage& reference) {
   });
 }
 
-double relativeSquaredBias(const std::vector<Rgb<float>>& runs, const ReferenceImage& reference) {
+SquaredBias relativeSquaredBias(const std::vector<Rgb<float>>& runs, const ReferenceImage& reference) {
   BRAID_ASSERT(runs.size() >= 2);
-  if (!reference.hasHalves()) return std::numeric_limits<double>::quiet_NaN();
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  if (!reference.hasHalves()) return {kNone, kNone};
   const Rgb<float>&a = reference.half[0], &b = reference.half[1];
   for (const Rgb<float>& run : runs) BRAID_ASSERT(run.size() == a.size() && run.width() == a.width());
   const auto n = static_cast<double>(runs.size());
-  return relativeMean(reference, runs.front(), [&](size_t c, size_t i) {
+  const auto product = [&](size_t c, size_t i) {
     double toA = 0, toB = 0, squares = 0;
     for (const Rgb<float>& run : runs) {
       const double x = at(run, c, i) - at(a, c, i), y = at(run, c, i) - at(b, c, i);
@@ -72,7 +105,8 @@ double relativeSquaredBias(const std::vector<Rgb<float>>& runs, const ReferenceI
       squares += x * y;
     }
     return (toA * toB - squares) / (n * (n - 1));
-  });
+  };
+  return {relativeMean(reference, runs.front(), product), blockStandardError(reference, product)};
 }
 
 double referenceNoise(const ReferenceImage& reference) {

@@ -23,8 +23,12 @@ double relL2Unbiased(const Rgb<float>& image, const ReferenceImage& reference);
 // Mean over pixels and channels of squared bias / (mean_RGB(R)² + 0.01): with e_k the errors of N >= 2 independent
 // runs, (Σ e_k)² - Σ e_k² over N (N - 1) has the mean bias² (products of different runs), and the halves of the
 // reference keep its noise out as in relL2Unbiased(). May be negative where there is next to no bias. NaN without
-// halves, infinite when an image is not finite.
-double relativeSquaredBias(const std::vector<Rgb<float>>& runs, const ReferenceImage& reference);
+// halves, infinite when an image is not finite. The standard error comes from the means of blocks of 16x16 pixels,
+// which hold the correlation of neighbours; it leaves out what whole images share.
+struct SquaredBias {
+  double value = 0, standardError = 0;
+};
+SquaredBias relativeSquaredBias(const std::vector<Rgb<float>>& runs, const ReferenceImage& reference);
 
 // What the noise of the reference's mean adds to relL2, on average: mean of ((A - B)/2)² / (mean_RGB(R)² + 0.01).
 // NaN without halves.

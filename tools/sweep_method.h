@@ -35,6 +35,7 @@ struct SweepMethod {
   // or worse than its mean.
   std::vector<MethodShare> inputs;
   bool features = false, quarters = false, history = false;  // what the estimates must hold
+  std::vector<uint64_t> stops;                               // passes at which they keep their image
   std::function<MethodImage(const std::shared_ptr<const Estimates>&)> finish;
 };
 

@@ -175,6 +175,7 @@ std::vector<SweepMethod> sweepMethods(const std::vector<std::string>& names, con
     method.features = parsed.needs.features;
     method.quarters = parsed.needs.quarters;
     method.history = parsed.needs.checkpoints > 0;
+    method.stops = parsed.needs.stops;
     method.finish = [pipeline, wanted = parsed.method](const std::shared_ptr<const Estimates>& estimates) {
       return pipeline->image(estimates, wanted);
     };

@@ -106,9 +106,9 @@ std::vector<ReplicateBias> replicateBiases(const std::string& folder, const Swee
       error += r.values[column];
     }
     if (runs.size() < 2) continue;
-    const double squaredBias = relativeSquaredBias(runs, reference);
-    biases.push_back({scene, method, static_cast<int>(runs.size()), squaredBias,
-                      error / static_cast<double>(runs.size()) - squaredBias});
+    const SquaredBias bias = relativeSquaredBias(runs, reference);
+    biases.push_back({scene, method, static_cast<int>(runs.size()), bias.value, bias.standardError,
+                      error / static_cast<double>(runs.size()) - bias.value});
   }
   return biases;
 }

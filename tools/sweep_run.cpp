@@ -75,6 +75,9 @@ Plan planOf(const SweepScene& scene, Settings settings, const SweepJob& job,
   settings.features = job.features;
   settings.quarters = job.quarters;
   settings.history = job.history;
+  settings.stops = job.stops;
+  std::sort(settings.stops.begin(), settings.stops.end());
+  settings.stops.erase(std::unique(settings.stops.begin(), settings.stops.end()), settings.stops.end());
   Plan plan = makePlan(*scene.scene, scene.camera, settings, integrators);
   BRAID_ASSERT(plan.integrators.size() == inputs.size());
   for (size_t i = 0; i < inputs.size(); ++i) plan.integrators[i].passesPerRound = inputs[i].passes;

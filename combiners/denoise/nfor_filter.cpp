@@ -23,6 +23,7 @@ constexpr int kVarianceWindow = 5, kVariancePatch = 1;
 constexpr double kRidge = 1e-3;
 constexpr float kScaleOffset = 0.1f;
 constexpr float kFallbackWeight = 0.25f;  // of the zero-order filter, where there is not a model for every pixel
+constexpr int kRange = 1;                 // pixels on each side
 constexpr float kLeastDivisor = 0.2f;     // added to the albedo
 
 // The image of value(channel, pixel); values that are not finite are 0.
@@ -99,6 +100,23 @@ Rgb<float> guideVariance(const Colours& colours, uint64_t passes, NforVariance k
   return regularisedVariance(e);
 }
 
+// Limits every value to the range of the image's in the pixels about it. Beside a small bright highlight, whose pixels
+// look like anything because they are so noisy, linear fits run far below and above all that is there.
+void keepInRange(Rgb<float>& fitted, const Rgb<float>& image) {
+  parallelRows(image.height(), [&](int y) {
+    for (size_t c = 0; c < 3; ++c)
+      for (int x = 0; x < image.width(); ++x) {
+        float least = image[c].at(x, y), most = least;
+        for (int v = std::max(0, y - kRange); v <= std::min(image.height() - 1, y + kRange); ++v)
+          for (int u = std::max(0, x - kRange); u <= std::min(image.width() - 1, x + kRange); ++u) {
+            least = std::min(least, image[c].at(u, v));
+            most = std::max(most, image[c].at(u, v));
+          }
+        fitted[c].at(x, y) = std::clamp(fitted[c].at(x, y), least, most);
+      }
+  });
+}
+
 // Regressions in one image: its offset planes, settings, and what was counted.
 class Regressor {
  public:
@@ -143,7 +161,9 @@ class Regressor {
     if (y_.height > 1) in.features.push_back({&y_});
     in.terms = {{&target, &window, nullptr}};
     in.fallback = weights.zeroOrder[0].empty() ? &target : &weights.zeroOrder[halfSensitivity ? 1 : 0];
-    return regress(in, settings_, &report);
+    Rgb<float> out = regress(in, settings_, &report);
+    keepInRange(out, target);
+    return out;
   }
 
   RegressionReport report;

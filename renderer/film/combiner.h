@@ -67,6 +67,9 @@ struct MethodInputs {
   uint64_t seed = 0;
   MethodOptions options;
   const std::atomic<bool>* cancel = nullptr;  // a cancelled method may return anything
+  // The unbiased estimate of fewer passes, mean, halves and variance, that `biased` and `redenoise` are made of; null:
+  // they are made of `unbiased`. For StoppingMethod only.
+  const Estimate* stopped = nullptr;
 };
 
 struct NamedPlane {

@@ -37,6 +37,8 @@ struct Checkpoint {
   uint64_t passes = 0;
   double seconds = 0;
   Rgb<float> variance;
+  // The image of then, where denoising is to stop (StoppingMethod); else empty.
+  Rgb<float> mean{}, half[2]{};
 };
 
 // Mean, halves and variance of the mean of one set of feature planes.

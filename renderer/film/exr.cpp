@@ -100,8 +100,13 @@ std::vector<ExrChannel> namedPlanes(const Estimates& estimates, const Rgb<float>
     addEstimate(channels, e, options.quarters);
     const auto history = estimates.history.find(e.name);
     if (!options.history || history == estimates.history.end()) continue;
-    for (const Checkpoint& c : history->second)
-      channels.add(e.name + ".variance" + std::to_string(c.passes), kColour, c.variance);
+    for (const Checkpoint& c : history->second) {
+      const std::string passes = std::to_string(c.passes);
+      channels.add(e.name + ".variance" + passes, kColour, c.variance);
+      channels.add(e.name + ".mean" + passes, kColour, c.mean);
+      channels.add(e.name + ".halfA" + passes, kColour, c.half[0]);
+      channels.add(e.name + ".halfB" + passes, kColour, c.half[1]);
+    }
   }
   for (const ExrLayer& layer : options.layers)
     if (layer.planes) channels.add(layer.name, kColour, *layer.planes);

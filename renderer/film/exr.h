@@ -23,7 +23,8 @@ struct ExrLayer {
 struct ExrOptions {
   AovSet aovs = AovSet::All;
   bool quarters = false;         // also <estimate>.q0 … q3
-  bool history = false;          // also <estimate>.variance1, variance2, variance4, …: after so many passes
+  bool history = false;          // also <estimate>.variance1, variance2, variance4, …: after so many passes,
+                                 // and mean1, halfA1, halfB1, … where they are kept
   bool floatHeadline = false;    // R G B as float instead of half
   std::string layerPrefix;       // e.g. "ViewLayer": put before every channel but R G B A
   std::vector<ExrLayer> layers;  // written with AovSet::All

@@ -81,7 +81,7 @@ Plane<float> FeatureAccumulator::variance(int component) const {
   Plane<float> out(a.width, a.height);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i)
-      out[i] = static_cast<float>(varianceOfMean(a[i] + sum_[1][c][i], sumsq_[c][i], passes()));
+      out[i] = floatVarianceOfMean(a[i] + sum_[1][c][i], sumsq_[c][i], passes());
   });
   return out;
 }

@@ -213,7 +213,7 @@ Rgb<float> Accumulator::biasVariance() const {
   for (size_t c = 0; c < 3; ++c)
     parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i)
-        out[c][i] = static_cast<float>(varianceOfMean(biasSum_[c][i], biasSumsq_[c][i], passes()));
+        out[c][i] = floatVarianceOfMean(biasSum_[c][i], biasSumsq_[c][i], passes());
     });
   return out;
 }
@@ -260,7 +260,7 @@ Rgb<float> Accumulator::passVariance() const {
       for (size_t i = begin; i < begin + width; ++i) {
         double total = 0;
         for (const Rgb<double>& s : sum_) total += s[c][i];
-        out[c][i] = static_cast<float>(varianceOfMean(total, sumsq_[c][i], n));
+        out[c][i] = floatVarianceOfMean(total, sumsq_[c][i], n);
       }
   });
   return out;
@@ -309,7 +309,7 @@ Rgb<float> Accumulator::variance(bool lowDiscrepancy) const {
     parallelChunks(out[c].size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         const double ratio = within[i] > 0 ? std::min(between[i] / within[i], ratioLimit) : 0.0;
-        out[c][i] = static_cast<float>(static_cast<double>(out[c][i]) * ratio);
+        out[c][i] = floatVariance(static_cast<double>(out[c][i]) * ratio);
       }
     });
   }

@@ -2,8 +2,10 @@
 #include "renderer/film/film_state.h"
 
 #include <algorithm>
+#include <charconv>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
@@ -66,6 +68,8 @@ std::string valueOf(const std::vector<StateOption>& options, const std::string& 
   return {};
 }
 
+constexpr char kStops[] = "the stop of denoising";
+
 // Sorts, and joins intervals that touch.
 void normalise(std::vector<PassInterval>& list) {
   std::sort(list.begin(), list.end(), [](const PassInterval& a, const PassInterval& b) { return a.begin < b.begin; });
@@ -86,6 +90,35 @@ void EstimateState::addPass(uint64_t pass) {
     ++passes.back().end;
   else
     passes.push_back({pass, pass + 1});
+}
+
+void EstimateState::keepCheckpoint(const std::vector<uint64_t>& stops) {
+  const uint64_t before = history.empty() ? 0 : history.back().passes;
+  Checkpoint c{sums.passes(), seconds, sums.variance(lowDiscrepancy)};
+  const bool image = std::any_of(stops.begin(), stops.end(), [&](uint64_t n) { return n > before && n <= c.passes; });
+  if (image && unbiased && correlation == Correlation::Independent) {
+    c.mean = sums.mean();
+    for (int h = 0; h < 2; ++h) c.half[h] = sums.halfMean(h);
+  }
+  history.push_back(std::move(c));
+}
+
+std::vector<StateOption> stopOptions(const std::vector<uint64_t>& stops) {
+  if (stops.empty()) return {};
+  return {{kStops, fmt::format("{}", fmt::join(stops, ","))}};
+}
+
+std::vector<uint64_t> stopsOf(const StateIdentity& identity) {
+  std::vector<uint64_t> stops;
+  const std::string text = valueOf(identity.options, kStops);
+  const char *at = text.data(), *end = at + text.size();
+  for (uint64_t n = 0; at < end; ++at) {
+    const auto [next, error] = std::from_chars(at, end, n);
+    if (error != std::errc()) break;
+    stops.push_back(n);
+    at = next;
+  }
+  return stops;
 }
 
 uint64_t FilmState::rounds() const {
@@ -156,8 +189,7 @@ void addShare(FilmState& state, const FilmState& next) {
     EstimateState& e = state.estimates[i];
     const EstimateState& n = next.estimates[i];
     BRAID_ASSERT(e.name == n.name);
-    if (!e.history.empty() && e.history.back().passes < e.sums.passes())
-      e.history.push_back({e.sums.passes(), e.seconds, e.sums.variance(e.lowDiscrepancy)});
+    if (!e.history.empty() && e.history.back().passes < e.sums.passes()) e.keepCheckpoint(stopsOf(state.identity));
     e.sums.add(n.sums);
     e.seconds += n.seconds;
     e.passes.insert(e.passes.end(), n.passes.begin(), n.passes.end());

@@ -37,6 +37,9 @@ struct EstimateState {
   uint64_t endPass() const { return passes.empty() ? 0 : passes.back().end; }
   // Notes that `pass`, not before endPass(), is among the sums.
   void addPass(uint64_t pass);
+  // Adds the present variance to the history; and the image, if it is the first in the history of at least one of
+  // these numbers of passes, and one that combiners improve: unbiased, with independent pixels.
+  void keepCheckpoint(const std::vector<uint64_t>& stops);
 };
 
 // An option that changes pixels, under its name on the command line.
@@ -52,6 +55,11 @@ struct StateIdentity {
   uint64_t sceneHash = 0;  // over every byte of the scene's files
   std::vector<StateOption> options;
 };
+
+// Numbers of passes after which denoising stops, as an option: histories hold the image there. Rising order, not 0.
+// None is no option.
+std::vector<StateOption> stopOptions(const std::vector<uint64_t>& stops);
+std::vector<uint64_t> stopsOf(const StateIdentity& identity);
 
 struct FilmState {
   StateIdentity identity;
@@ -82,7 +90,8 @@ std::string overlap(const FilmState& a, const FilmState& b);
 
 // Adds the passes of a later share to those of an earlier one: identities equal (difference() empty), passes disjoint
 // (overlap() empty), `next` begins behind `state`. Histories do not add up: that of `state` stays, and grows by the
-// point before this addition, if there is a history at all.
+// point before this addition, if there is a history at all; where denoising is to stop, the image is that of the first
+// shares that have passes enough.
 void addShare(FilmState& state, const FilmState& next);
 
 }  // namespace braid

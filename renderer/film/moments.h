@@ -2,7 +2,9 @@
 // The variance of a mean from a sum and a sum of squares.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 
 namespace braid {
 
@@ -16,6 +18,15 @@ inline double varianceOfMean(double sum, double sumOfSquares, uint64_t n) {
   const double spread = sumOfSquares / count - meanSquare;
   const double rounding = count * 0x1p-53 * meanSquare;
   return spread > rounding ? spread / (count - 1) : 0.0;
+}
+
+// A variance as a float. Those of samples beyond 10^19 leave the range of floats and stay at its end: an infinite one
+// would later be taken for none at all.
+inline float floatVariance(double variance) {
+  return static_cast<float>(std::min(variance, static_cast<double>(std::numeric_limits<float>::max())));
+}
+inline float floatVarianceOfMean(double sum, double sumOfSquares, uint64_t n) {
+  return floatVariance(varianceOfMean(sum, sumOfSquares, n));
 }
 
 }  // namespace braid

@@ -37,7 +37,9 @@ void forEachPlane(const FilmState& state, const Visit& visit) {
       colour(e.sums.biasSum());
       colour(e.sums.biasSumOfSquares());
     }
-    for (const Checkpoint& c : e.history) colour(c.variance);
+    for (const Checkpoint& c : e.history)
+      for (const Rgb<float>* image : {&c.variance, &c.mean, &c.half[0], &c.half[1]})
+        if (!image->empty()) colour(*image);
   }
   if (state.features) {
     for (int half = 0; half < 2; ++half)
@@ -150,7 +152,12 @@ void readEstimate(Reader& in, const FilmState& state, const EstimateLayout& layo
     Rgb<double> bias = readColour<double>(in, state);
     e.sums.setBiasSums(std::move(bias), readColour<double>(in, state));
   }
-  for (Checkpoint& c : e.history) c.variance = readColour<float>(in, state);
+  for (size_t k = 0; k < e.history.size(); ++k) {
+    Checkpoint& c = e.history[k];
+    c.variance = readColour<float>(in, state);
+    if (!layout.images[k]) continue;
+    for (Rgb<float>* image : {&c.mean, &c.half[0], &c.half[1]}) *image = readColour<float>(in, state);
+  }
 }
 
 FeatureAccumulator readFeatures(Reader& in, const FilmState& state, const StateLayout& layout) {

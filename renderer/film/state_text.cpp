@@ -158,7 +158,8 @@ std::string estimateLines(const EstimateState& e, const EstimateLayout& layout) 
                   layout.clampedSplats, layout.bias, fmt::join(layout.counts, " "));
   for (const PassInterval& i : e.passes) text += fmt::format(" {}:{}", i.begin, i.end);
   text += '\n';
-  for (const Checkpoint& c : e.history) text += fmt::format("checkpoint {} {}\n", c.passes, c.seconds);
+  for (const Checkpoint& c : e.history)
+    text += fmt::format("checkpoint {} {}{}\n", c.passes, c.seconds, c.mean.empty() ? "" : " image");
   return text;
 }
 
@@ -252,6 +253,8 @@ void parseLine(Line& line, FilmState& state, StateLayout& layout, size_t& planes
     Checkpoint& c = latest().history.emplace_back();
     c.passes = line.count(kMaxPass);
     c.seconds = line.seconds();
+    layout.estimates.back().images.push_back(!line.done());
+    if (!line.done() && line.raw() != "image") line.fail("a checkpoint with more than its image");
   } else if (key == "features") {
     layout.features = true;
     for (uint64_t& n : layout.featurePasses) n = line.count(kMaxPass);
@@ -281,6 +284,7 @@ StateLayout layoutOf(const FilmState& state) {
     l.rejected = e.sums.rejected();
     l.clampedSplats = e.sums.clampedSplats();
     l.bias = e.sums.keepsBias();
+    for (const Checkpoint& c : e.history) l.images.push_back(!c.mean.empty());
     layout.estimates.push_back(std::move(l));
   }
   layout.features = state.features.has_value();
@@ -303,7 +307,12 @@ std::vector<PlaneEntry> planeTable(const FilmState& state, const StateLayout& la
       colour(e.name + ".bias", 8);
       colour(e.name + ".biasSquares", 8);
     }
-    for (const Checkpoint& c : e.history) colour(fmt::format("{}.variance{}", e.name, c.passes), 4);
+    for (size_t k = 0; k < e.history.size(); ++k) {
+      const std::string passes = std::to_string(e.history[k].passes);
+      colour(e.name + ".variance" + passes, 4);
+      if (layout.estimates[i].images[k])
+        for (const char* part : {".mean", ".halfA", ".halfB"}) colour(e.name + part + passes, 4);
+    }
   }
   if (layout.features)
     for (const char* part : {"sumA", "sumB", "squares"})

@@ -16,6 +16,7 @@ struct EstimateLayout {
   std::vector<uint64_t> counts;  // passes in each bucket
   uint64_t rejected = 0, clampedSplats = 0;
   bool bias = false;
+  std::vector<bool> images;  // whether a checkpoint of the history has its image
 };
 
 struct StateLayout {

@@ -33,26 +33,29 @@ std::vector<StateOption> pixelOptions(const Plan& plan) {
   for (const PlannedIntegrator& p : plan.integrators)
     integrators += fmt::format("{}{}{}", integrators.empty() ? "" : ",", p.integrator->name(),
                                p.passesPerRound > 1 ? fmt::format("*{}", p.passesPerRound) : "");
-  return {{"--size", fmt::format("{}x{}", s.width, s.height)},
-          {"--crop", fmt::format("{},{},{},{}", w.x0, w.y0, w.x1, w.y1)},
-          {"the camera", cameraHash(plan.camera)},
-          {"--integrator", integrators},
-          {"--seed", std::to_string(s.seed)},
-          {"--sampler", s.sampler == SamplerKind::Sobol ? "sobol" : "independent"},
-          {"--filter", toString(s.filter)},
-          {"--max-depth", std::to_string(s.maxDepth)},
-          {"--lights", toString(s.lightStrategy)},
-          {"--clamp", fmt::format("{}", s.clamp)},
-          {"--background",
-           s.background ? fmt::format("{},{},{}", s.background->x, s.background->y, s.background->z) : "none"},
-          {"--transparent", yesOrNo(s.transparent)},
-          {"--photons", std::to_string(s.photons)},
-          {"--photon-radius", fmt::format("{}", s.photonRadius)},
-          {"--photon-direct", yesOrNo(s.photonDirect)},
-          {"photon aiming", yesOrNo(s.photonAiming)},
-          {"keeping quarters", yesOrNo(plan.buckets == 4)},
-          {"keeping features", yesOrNo(plan.features)},
-          {"keeping history", yesOrNo(s.history)}};
+  std::vector<StateOption> list{
+      {"--size", fmt::format("{}x{}", s.width, s.height)},
+      {"--crop", fmt::format("{},{},{},{}", w.x0, w.y0, w.x1, w.y1)},
+      {"the camera", cameraHash(plan.camera)},
+      {"--integrator", integrators},
+      {"--seed", std::to_string(s.seed)},
+      {"--sampler", s.sampler == SamplerKind::Sobol ? "sobol" : "independent"},
+      {"--filter", toString(s.filter)},
+      {"--max-depth", std::to_string(s.maxDepth)},
+      {"--lights", toString(s.lightStrategy)},
+      {"--clamp", fmt::format("{}", s.clamp)},
+      {"--background",
+       s.background ? fmt::format("{},{},{}", s.background->x, s.background->y, s.background->z) : "none"},
+      {"--transparent", yesOrNo(s.transparent)},
+      {"--photons", std::to_string(s.photons)},
+      {"--photon-radius", fmt::format("{}", s.photonRadius)},
+      {"--photon-direct", yesOrNo(s.photonDirect)},
+      {"photon aiming", yesOrNo(s.photonAiming)},
+      {"keeping quarters", yesOrNo(plan.buckets == 4)},
+      {"keeping features", yesOrNo(plan.features)},
+      {"keeping history", yesOrNo(s.history)}};
+  for (StateOption& stop : stopOptions(s.stops)) list.push_back(std::move(stop));
+  return list;
 }
 
 }  // namespace braid

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
@@ -115,6 +116,10 @@ void planFilm(const Settings& settings, Plan& plan) {
                         settings.history ? fmt::format("variances after rounds 1, 2, 4, ...: {} bytes a pixel each",
                                                        12 * plan.integrators.size())
                                          : "no combiner looks at convergence"});
+  if (!settings.stops.empty())
+    plan.lines.push_back(
+        {true, "stop of denoising",
+         fmt::format("the image after {} passes: 36 bytes a pixel each", fmt::join(settings.stops, ", "))});
   plan.lines.push_back({true, "film",
                         fmt::format("{} bytes a pixel, {:.1f} MiB", plan.filmBytesPerPixel,
                                     static_cast<double>(plan.filmBytesPerPixel) * plan.window.width() *

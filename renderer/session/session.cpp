@@ -233,8 +233,9 @@ std::optional<Plane<float>> Session::alpha() const {
 }
 
 void Session::keepCheckpoints() {
-  for (EstimateState& e : film_.estimates)
-    e.history.push_back({e.sums.passes(), e.seconds, e.sums.variance(e.lowDiscrepancy)});
+  // The passes before a later share are not its own: where the stop lies is known when shares are added.
+  const std::vector<uint64_t> stops = plan_.settings.firstRound > 0 ? std::vector<uint64_t>{} : plan_.settings.stops;
+  for (EstimateState& e : film_.estimates) e.keepCheckpoint(stops);
 }
 
 }  // namespace braid

@@ -30,6 +30,7 @@ struct Settings {
   bool features = true;  // albedo, normal, depth, visibility
   bool quarters = false;
   bool history = false;                // variances after rounds 1, 2, 4, …
+  std::vector<uint64_t> stops;         // passes, rising: the first of these rounds with as many keeps its image as well
   bool transparent = false;            // camera rays that miss: no radiance, alpha 0
   std::optional<Spectrum> background;  // what camera rays that miss see instead of the environment
   float clamp = 0;                     // largest channel of one path's radiance; 0: off (unbiased)

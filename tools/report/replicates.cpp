@@ -10,7 +10,8 @@ namespace braid {
 
 namespace {
 
-constexpr const char* kColumns[] = {"scene", "method", "runs", "squared bias", "variance", "bias share"};
+constexpr const char* kColumns[] = {"scene",    "method",    "runs", "squared bias", "± standard error",
+                                    "variance", "bias share"};
 
 std::vector<std::string> cellsOf(const ReplicateBias& b) {
   const double error = b.squaredBias + b.variance;
@@ -18,6 +19,7 @@ std::vector<std::string> cellsOf(const ReplicateBias& b) {
           b.method,
           fmt::format("{}", b.runs),
           shortNumber(b.squaredBias),
+          shortNumber(b.standardError),
           shortNumber(b.variance),
           error > 0 ? fmt::format("{:.1f} %", 100 * b.squaredBias / error) : "–"};
 }

@@ -11,7 +11,7 @@ namespace braid {
 struct ReplicateBias {
   std::string scene, method;
   int runs = 0;
-  double squaredBias = 0, variance = 0;
+  double squaredBias = 0, standardError = 0, variance = 0;
 };
 
 // Scenes × methods as Markdown and as an HTML table: squared bias, its share of the error.
