@@ -245,7 +245,7 @@ void BidirectionalKernel::addEnvironment(int index, const SubpathState& state) {
   else if (scene_.environment())
     radiance = scene_.environment()->radiance(state.direction);
   if (plan_.features && !featuresDone_[static_cast<size_t>(index)]) {
-    sample.features.albedo = radiance;
+    sample.features.setAlbedo(radiance);
     sample.features.normal = -state.direction;
     sample.features.depth = 0;
   }

@@ -16,8 +16,9 @@ Camera::CameraRay cameraRayThrough(const Plan& plan, const SampleBlock& camera, 
 bool recordFeatures(const Scene& scene, const SubpathVertex& vertex, int maxDepth, FeatureSample& features) {
   if (!vertex.bsdf.hasNonDelta() && vertex.segments < maxDepth) return false;
   const Hit& hit = vertex.hit;
-  features.albedo = vertex.bsdf.albedo();
-  if (hit.material->emissive()) features.albedo += scene.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
+  Spectrum albedo = vertex.bsdf.albedo();
+  if (hit.material->emissive()) albedo += scene.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
+  features.setAlbedo(albedo);
   features.normal = hit.frame.n;
   features.depth = vertex.travelled;
   return true;
@@ -26,7 +27,7 @@ bool recordFeatures(const Scene& scene, const SubpathVertex& vertex, int maxDept
 Spectrum unlitColor(const Scene& scene, const SubpathVertex& vertex, bool record, FeatureSample& features) {
   const Spectrum color = baseColorAt(scene, vertex.hit);
   if (record) {
-    features.albedo = color;
+    features.setAlbedo(color);
     features.normal = vertex.hit.frame.n;
     features.depth = vertex.travelled;
   }

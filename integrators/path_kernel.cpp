@@ -29,7 +29,7 @@ void PathKernel::addEnvironment(const PathState& path, PathSample& sample) const
     radiance = scene_.environment()->radiance(path.direction);
   }
   if (wantFeatures_ && !path.featuresDone) {
-    sample.features.albedo = radiance;
+    sample.features.setAlbedo(radiance);
     sample.features.normal = -path.direction;
     sample.features.depth = 0;
   }
@@ -77,7 +77,7 @@ void PathKernel::addUnlit(PathState& path, const Hit& hit, PathSample& sample) c
   if (path.lightCouldNotBeSampled) sample.radiance += path.throughput * color;
   if (!wantFeatures_ || path.featuresDone) return;
   path.featuresDone = true;
-  sample.features.albedo = color;
+  sample.features.setAlbedo(color);
   sample.features.normal = hit.frame.n;
   sample.features.depth = path.featureDistance + hit.distance;
 }
@@ -86,8 +86,9 @@ void PathKernel::recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsd
   path.featureDistance += hit.distance;
   if (!bsdf.hasNonDelta() && path.segments < plan_.settings.maxDepth) return;
   path.featuresDone = true;
-  sample.features.albedo = bsdf.albedo();
-  if (hit.material->emissive()) sample.features.albedo += scene_.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
+  Spectrum albedo = bsdf.albedo();
+  if (hit.material->emissive()) albedo += scene_.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
+  sample.features.setAlbedo(albedo);
   sample.features.normal = hit.frame.n;
   sample.features.depth = path.featureDistance;
 }

@@ -125,7 +125,7 @@ void PhotonEyeBatch::addEnvironment(int index, const SubpathState& state) {
     radiance = scene_.environment()->radiance(state.direction);
   }
   if (plan_.features && !path.featuresDone) {
-    sample.features.albedo = radiance;
+    sample.features.setAlbedo(radiance);
     sample.features.normal = -state.direction;
     sample.features.depth = 0;
   }

@@ -61,7 +61,7 @@ Publisher::~Publisher() {
 }
 
 Estimates describedEstimates(const Session& session, bool timing) {
-  Estimates e = *session.snapshot();
+  Estimates e = session.estimates();
   e.attributes = session.state().attributes;
   for (Attribute& a : passAttributes(e, session.state().seconds, timing)) e.attributes.push_back(std::move(a));
   return e;

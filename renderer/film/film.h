@@ -28,6 +28,9 @@ struct FeatureSample {
   float depth = 0;
   float visibility = 0;
   static constexpr int kComponents = 8;
+
+  // What shines is white, however brightly: features do not scale with the light.
+  void setAlbedo(const Spectrum& value) { albedo = glm::clamp(value, Spectrum(0), Spectrum(1)); }
 };
 
 // What an integrator writes during one pass. add() and features() belong to the task that owns the pixel; splat() may

@@ -9,6 +9,7 @@ namespace braid::gltf {
 
 namespace {
 
+constexpr float kLargestIor = 100;
 constexpr float kLargest = std::numeric_limits<float>::max();
 // More texture coordinate sets than this exist in no real file.
 constexpr uint64_t kMaxUvSet = 31;
@@ -96,6 +97,10 @@ class MaterialReader {
     if (m.ior != 0 && m.ior < 1) {
       ior.warn("an index of refraction is below 1; 1 is used");
       m.ior = 1;
+    }
+    if (m.ior > kLargestIor) {
+      ior.warn("an index of refraction is above 100; 100 is used");
+      m.ior = kLargestIor;
     }
     m.dispersion = json.extension("KHR_materials_dispersion")["dispersion"].clamped(0, 0, kLargest);
     const JsonRef specular = json.extension("KHR_materials_specular");

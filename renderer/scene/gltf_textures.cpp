@@ -143,6 +143,10 @@ void MaterialTable::loadTextures() {
   for (const uint32_t image : unique) {
     DecodedImage& item = decoded[image];
     if (!item.problem.empty()) document_.report.problem("/images/" + std::to_string(image), item.problem);
+    if (item.image && item.image->limited > 0)
+      document_.report.warn(
+          "/images/" + std::to_string(image),
+          std::to_string(item.image->limited) + " values are not finite, negative or above 1e18; they are limited");
     if (item.image && document_.images[image].view == kNone)
       document_.hash.add(item.encoded.data(), item.encoded.size());
     item.file = {};

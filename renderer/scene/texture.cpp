@@ -14,6 +14,7 @@ namespace braid {
 
 namespace {
 
+constexpr float kLargestRadiance = 1e18f;  // its square is a float, too
 constexpr uint64_t kMaxPixels = uint64_t(1) << 28;
 
 float srgbToLinear(float v) { return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f); }
@@ -182,7 +183,9 @@ std::shared_ptr<const Image> readPixels(OIIO::ImageInput& input, const std::stri
     throw Error(ExitCode::BadInput, "is a broken image (" + oneLine(input.geterror()) + "); save it again");
   }
   for (float& v : image->floats) {
-    if (!std::isfinite(v)) v = 0;
+    const float meant = std::isfinite(v) ? std::clamp(v, 0.0f, kLargestRadiance) : 0.0f;
+    image->limited += meant != v;
+    v = meant;
   }
   return image;
 }

@@ -20,6 +20,7 @@ struct Image {
   int channels = 0;  // 1 grey, 2 grey+alpha, 3 RGB, 4 RGBA
   std::vector<uint8_t> bytes;
   std::vector<float> floats;   // linear, unless the source held 16-bit integers:
+  size_t limited = 0;          // floats that were not finite, negative, or larger than an image can mean
   bool integerFloats = false;  // floats are 16-bit integers scaled to [0,1], sRGB-encoded when the texture is a colour
   bool hasAlpha() const { return channels == 2 || channels == 4; }
 };

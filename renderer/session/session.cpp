@@ -223,9 +223,9 @@ RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bo
   return result;
 }
 
-std::shared_ptr<const Estimates> Session::snapshot() const {
-  return std::make_shared<const Estimates>(estimatesOf(film_, plan_.settings.quarters));
-}
+Estimates Session::estimates() const { return estimatesOf(film_, plan_.settings.quarters); }
+
+std::shared_ptr<const Estimates> Session::snapshot() const { return std::make_shared<const Estimates>(estimates()); }
 
 std::optional<Plane<float>> Session::alpha() const {
   if (!film_.coverage) return std::nullopt;

@@ -69,6 +69,8 @@ class Session {
 
   // The estimates so far; call these from the progress callback or after run().
   std::shared_ptr<const Estimates> snapshot() const;
+  // The same to keep and change.
+  Estimates estimates() const;
   std::optional<Plane<float>> alpha() const;
   const FilmState& state() const { return film_; }
 

@@ -133,7 +133,8 @@ uint32_t materialLobes(const Material& m) {
 Spectrum baseColorAt(const Scene& scene, const Hit& hit) {
   const Material& m = *hit.material;
   Spectrum color = m.baseColor;
-  if (m.baseColorTexture) color *= Spectrum(scene.lookup(m.baseColorTexture, *hit.mesh, hit.triangle, hit.u, hit.v));
+  if (m.baseColorTexture)  // of floats, it may be above 1
+    color *= glm::min(Spectrum(scene.lookup(m.baseColorTexture, *hit.mesh, hit.triangle, hit.u, hit.v)), Spectrum(1));
   if (!hit.mesh->colors.empty())
     color *= Spectrum(interpolate(hit.mesh->colors, hit.mesh->triangles[hit.triangle], hit.u, hit.v));
   return color;
