@@ -167,8 +167,9 @@ MethodResult Auto::run(const MethodInputs& in) const {
   std::vector<const Estimate*> photonMaps, others;
   for (const Estimate* b : in.bases)
     (!b->bias.empty() && in.options.number(kFuse) != 0 ? photonMaps : others).push_back(b);
-  const FusedEstimate fused = fusedEstimate(*in.unbiased, photonMaps, in.features);
-  const Estimate& x = fused.image;
+  FusedEstimate fused;
+  if (!photonMaps.empty()) fused = fusedEstimate(*in.unbiased, photonMaps, in.features);
+  const Estimate& x = photonMaps.empty() ? *in.unbiased : fused.image;
   std::vector<Estimate> bases;
   for (const Estimate* b : others) bases.push_back(consistentHalves(baseOf(*b, x, !photonMaps.empty(), in)));
   for (Estimate& e : filtersOf(x, in.features, in.cancel)) bases.push_back(std::move(e));

@@ -86,22 +86,15 @@ std::string methodList() {
   return text;
 }
 
-Recipe planCombining(const Scene& scene, const CameraData& camera, Settings& settings,
-                     const std::vector<const Integrator*>& integrators, const CombineChoice& choice) {
+Recipe planCombining(const CombineChoice& choice, uint64_t samples, Plan& plan) {
   if (choice.wanted().empty() && choice.denoisers.empty()) return {};
   // By what could be kept, what has to be: quarters and history are of no use elsewhere.
   Facts facts;
   facts.features = true;
-  for (const PlannedIntegrator& p : makePlan(scene, camera, settings, integrators).integrators)
-    facts.estimates.push_back(plannedEstimate(p, settings.spp));
+  for (const PlannedIntegrator& p : plan.integrators) facts.estimates.push_back(plannedEstimate(p, samples));
   Recipe recipe = makeRecipe(facts, choice.wanted(), choice.options().roles);
   const RecipeNeeds needs = needsOf(recipe);
-  settings.quarters |= needs.quarters;
-  settings.features |= needs.features;
-  settings.history |= needs.checkpoints > 0;
-  settings.stops.insert(settings.stops.end(), needs.stops.begin(), needs.stops.end());
-  std::sort(settings.stops.begin(), settings.stops.end());
-  settings.stops.erase(std::unique(settings.stops.begin(), settings.stops.end()), settings.stops.end());
+  keepAlso({needs.quarters, needs.features, needs.checkpoints > 0, needs.stops}, plan);
   return recipe;
 }
 

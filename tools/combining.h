@@ -35,10 +35,9 @@ void addCombineOptions(CLI::App& command, CombineChoice& choice);
 // One line a method for the help of commands.
 std::string methodList();
 
-// The steps that will run after a render with these settings; the settings get what the steps need to be kept:
-// quarters, features, history, images for the stop of denoising. Throws Error(Usage) for unknown names.
-Recipe planCombining(const Scene& scene, const CameraData& camera, Settings& settings,
-                     const std::vector<const Integrator*>& integrators, const CombineChoice& choice);
+// The steps that will run after a render of so many samples (0: not known); the plan gets what the steps need to be
+// kept: quarters, features, history, images for the stop of denoising. Throws Error(Usage) for unknown names.
+Recipe planCombining(const CombineChoice& choice, uint64_t samples, Plan& plan);
 
 // "+ js: of pt and nfor" or "- curves: needs 3 checkpoints of pt, which has 2", a line for each step.
 std::string recipeText(const Recipe& recipe);

@@ -105,13 +105,13 @@ int runPlan(const PlanOptions& o) {
   const CameraData camera = chooseCamera(data, o.scene);
   const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene);
   const auto integrators = makeIntegrators();
-  const Recipe recipe = planCombining(*scene, camera, settings, pointersTo(integrators), o.image.combine);
+  Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
+  const Recipe recipe = planCombining(o.image.combine, settings.spp, plan);
   if (o.tasks > 0) {
     requireRunnable(recipe, o.image.combine.wanted());
-    fmt::print("{}", farmJobText(farmJob(o, settings), parseFarmFormat(o.format)));
+    fmt::print("{}", farmJobText(farmJob(o, plan.settings), parseFarmFormat(o.format)));
     return 0;
   }
-  const Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
   const size_t memory[] = {scene->accel().bytes(), scene->geometryBytes(), scene->textureBytes()};
   if (!o.json) {
     fmt::print("{}{}", plan.text(), recipeText(recipe));

@@ -109,10 +109,9 @@ class Audience {
 };
 
 // What combiners do, as far as they can with this scene and these settings.
-Recipe planPreview(const Scene& scene, const CameraData& camera, Settings& settings,
-                   const std::vector<const Integrator*>& integrators, PreviewOptions& o, Audience& audience) {
-  Settings combining = settings;
-  const Recipe recipe = planCombining(scene, camera, combining, integrators, o.image.combine);
+Recipe planPreview(Plan& plan, PreviewOptions& o, Audience& audience) {
+  Plan combining = plan;
+  const Recipe recipe = planCombining(o.image.combine, plan.settings.spp, combining);
   try {
     requireRunnable(recipe, o.image.combine.wanted());
   } catch (const Error& e) {
@@ -121,7 +120,7 @@ Recipe planPreview(const Scene& scene, const CameraData& camera, Settings& setti
     o.image.combine.combine = "none";
     return {};
   }
-  settings = combining;
+  plan = std::move(combining);
   return recipe;
 }
 
@@ -162,8 +161,9 @@ int runPreview(PreviewOptions o) {
   const CameraData camera = chooseCamera(data, o.scene);
   const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene);
   const auto integrators = makeIntegrators();
-  const Recipe recipe = planPreview(*scene, camera, settings, pointersTo(integrators), o, audience);
-  Session session(*scene, makePlan(*scene, camera, settings, pointersTo(integrators)));
+  Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
+  const Recipe recipe = planPreview(plan, o, audience);
+  Session session(*scene, std::move(plan));
   session.identify(BRAID_VERSION, BRAID_BUILD_FLAGS, sceneIdentity(o.scene, scene->data()),
                    planAttributes(*scene, session.plan(), scene->accel().isa()));
   const std::string planText = session.plan().text() + recipeText(recipe);

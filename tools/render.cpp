@@ -101,19 +101,6 @@ void keepAsBefore(const FilmState& state, Settings& settings) {
   settings.stops = stopsOf(state.identity);
 }
 
-// What has to be kept for combining the passes of all machines, of which a share has few.
-Recipe planCombiningOfAll(const Scene& scene, const CameraData& camera, Settings& settings,
-                          const std::vector<const Integrator*>& integrators, const CombineChoice& choice) {
-  Settings all = settings;
-  if (settings.spp > 0) all.spp += settings.firstRound;
-  Recipe recipe = planCombining(scene, camera, all, integrators, choice);
-  settings.quarters = all.quarters;
-  settings.features = all.features;
-  settings.history = all.history;
-  settings.stops = all.stops;
-  return recipe;
-}
-
 nlohmann::json errorOrNull(const std::optional<double>& error) {
   return error ? nlohmann::json(*error) : nlohmann::json(nullptr);
 }
@@ -231,9 +218,11 @@ int runRender(const RenderOptions& o) {
   const CameraData camera = chooseCamera(data, o.scene);
   const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene);
   const auto integrators = makeIntegrators();
-  const Recipe recipe = planCombiningOfAll(*scene, camera, settings, pointersTo(integrators), o.image.combine);
+  Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
+  // The passes of all machines will be combined, of which a share has few.
+  const Recipe recipe = planCombining(o.image.combine, settings.spp > 0 ? settings.spp + settings.firstRound : 0, plan);
   if (!o.image.files().empty()) requireRunnable(recipe, o.image.combine.wanted());
-  Session session(*scene, makePlan(*scene, camera, settings, pointersTo(integrators)));
+  Session session(*scene, std::move(plan));
   session.identify(BRAID_VERSION, BRAID_BUILD_FLAGS, sceneIdentity(o.scene, scene->data()),
                    planAttributes(*scene, session.plan(), scene->accel().isa()));
   const std::string planText = session.plan().text() + recipeText(recipe);

@@ -93,7 +93,9 @@ void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
                             : fmt::format("{} finite lights: chosen by power", finite)});
 }
 
-void planFilm(const Settings& settings, Plan& plan) {
+void planFilm(Plan& plan) {
+  const Settings& settings = plan.settings;
+  plan.lines.resize(plan.filmLine);
   plan.buckets = settings.quarters || settings.full ? 4 : 2;
   plan.features = settings.features || settings.full;
   const uint64_t accumulator = plan.buckets == 4 ? 120 : 72;
@@ -147,8 +149,20 @@ Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& sett
                                              w.x1, w.y1, settings.width, settings.height));
   planIntegrators(scene, settings, available, plan);
   planSceneParts(scene, settings, plan);
-  planFilm(settings, plan);
+  plan.filmLine = plan.lines.size();
+  planFilm(plan);
   return plan;
+}
+
+void keepAlso(const FilmNeeds& needs, Plan& plan) {
+  Settings& s = plan.settings;
+  s.quarters |= needs.quarters;
+  s.features |= needs.features;
+  s.history |= needs.history;
+  s.stops.insert(s.stops.end(), needs.stops.begin(), needs.stops.end());
+  std::sort(s.stops.begin(), s.stops.end());
+  s.stops.erase(std::unique(s.stops.begin(), s.stops.end()), s.stops.end());
+  planFilm(plan);
 }
 
 std::string Plan::text() const {

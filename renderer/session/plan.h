@@ -32,6 +32,7 @@ struct Plan {
   bool features = true;
   std::vector<PlannedIntegrator> integrators;
   std::vector<PlanLine> lines;
+  size_t filmLine = 0;  // of lines: where those about the film begin
   uint64_t filmBytesPerPixel = 0;
 
   // "+ subject: reason" for what is kept, "- subject: reason" for what is left out, one line each.
@@ -47,5 +48,13 @@ inline uint64_t pixelItem(const Plan& plan, int x, int y) {
 // `available` are the registered integrators. Throws Error(Usage) naming an unknown integrator and the known ones.
 Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& settings,
               const std::vector<const Integrator*>& available);
+
+// What readers of the estimates need kept. Stops: numbers of passes after which the image is kept.
+struct FilmNeeds {
+  bool quarters = false, features = false, history = false;
+  std::vector<uint64_t> stops;
+};
+// Keeps these as well: the plan that makePlan() would give for such settings, without another look at the scene.
+void keepAlso(const FilmNeeds& needs, Plan& plan);
 
 }  // namespace braid

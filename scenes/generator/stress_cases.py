@@ -138,10 +138,13 @@ def _dielectrics():
         (0, 0, 0.9), (0, 0.9, 0)), short=True)
     yield Case("camera on glass", lambda: s.look_from(
         (0, 0.6, 0.5), (0, 0.6, 0), s.balls_in_balls((0.5, at, 1.5))))
+    # A surface through the eye is met at distance 0, where there is no
+    # footprint to gather photons over: sppm is dark there.
+    unmerged = ("bdpt", "crn", "gdpt", "vcm")
     yield Case("camera along a surface", lambda: s.look_from(
-        (0, 0, 0.9), (0, 0, 0)), short=True)
+        (0, 0, 0.9), (0, 0, 0)), agree=unmerged, short=True)
     yield Case("camera in a wall, along it", lambda: s.look_from(
-        (-1, 1, 0.9), (-1, 1, 0)))
+        (-1, 1, 0.9), (-1, 1, 0)), agree=unmerged)
 
 
 def _geometry():
