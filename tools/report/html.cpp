@@ -45,7 +45,7 @@ std::string winTable(const SweepSummary& s) {
   if (s.methods.size() < 2) return {};
   std::vector<std::string> names{"wins of … against"};
   names.insert(names.end(), s.methods.begin(), s.methods.end());
-  std::string t = "<table>\n" + headerRow(names);
+  std::string t = "<div class=wide><table>\n" + headerRow(names);
   for (size_t i = 0; i < s.methods.size(); ++i) {
     t += "<tr>" + cell(s.methods[i]);
     for (size_t j = 0; j < s.methods.size(); ++j) {
@@ -54,7 +54,7 @@ std::string winTable(const SweepSummary& s) {
     }
     t += "</tr>\n";
   }
-  return t + "</table>\n";
+  return t + "</table></div>\n";
 }
 
 // Equal time first, then every column of the CSV at the last rung.
