@@ -329,6 +329,21 @@ inline bool allFinite(const Rgb<float>& image) {
   return allFinite(image[0]) && allFinite(image[1]) && allFinite(image[2]);
 }
 
+// The planes of a result that hold a value that is not finite, or a squared error below 0.
+inline std::string badPlanes(const MethodResult& r) {
+  std::string bad;
+  const auto check = [&bad](bool ok, const std::string& name) {
+    if (!ok) bad += name + " ";
+  };
+  check(allFinite(r.image.mean), "mean");
+  check(allFinite(r.image.half[0]) && allFinite(r.image.half[1]), "half");
+  check(allFinite(r.image.variance), "variance");
+  check(allFinite(r.error) && std::all_of(r.error.data.begin(), r.error.data.end(), [](float v) { return v >= 0; }),
+        "error");
+  for (const NamedPlane& p : r.aovs) check(allFinite(p.plane), p.name);
+  return bad;
+}
+
 // Same sizes and same bits.
 inline bool identical(const Plane<float>& a, const Plane<float>& b) {
   return a.width == b.width && a.height == b.height &&

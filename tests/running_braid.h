@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include <fcntl.h>
 #include <spawn.h>
 
 #include "tests/command_line.h"
@@ -35,15 +36,21 @@ inline std::vector<Json> records(const fs::path& path, const std::string& event)
   return some;
 }
 
-// `braid render` of the Cornell box; output goes to the test's own.
+// A command of braid on the Cornell box; what it prints goes to the test's own output or to the file named.
 class Process {
  public:
-  explicit Process(std::vector<std::string> words) : words_(std::move(words)) {
-    words_.insert(words_.begin(), {BRAID_BINARY, "render", kCornellFile, "-q"});
+  explicit Process(std::vector<std::string> words, const char* command = "render", const fs::path& printed = {}) {
+    words.insert(words.begin(), {BRAID_BINARY, command, kCornellFile, "-q"});
     std::vector<char*> arguments;
-    for (std::string& w : words_) arguments.push_back(w.data());
+    for (std::string& w : words) arguments.push_back(w.data());
     arguments.push_back(nullptr);
-    REQUIRE(posix_spawn(&child_, BRAID_BINARY, nullptr, nullptr, arguments.data(), environ) == 0);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    if (!printed.empty())
+      posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, printed.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    const int failure = posix_spawn(&child_, BRAID_BINARY, &actions, nullptr, arguments.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    REQUIRE(failure == 0);
   }
   ~Process() {
     if (child_ == 0) return;
@@ -63,7 +70,6 @@ class Process {
   }
 
  private:
-  std::vector<std::string> words_;
   pid_t child_ = 0;
 };
 

@@ -71,21 +71,6 @@ PipelineOutput outputOf(const Method& method, const Estimates& estimates) {
   return *result.find(name);
 }
 
-// The planes of a result that hold a value that is not finite, or a squared error below 0.
-std::string badPlanes(const MethodResult& r) {
-  std::string bad;
-  const auto check = [&bad](bool ok, const std::string& name) {
-    if (!ok) bad += name + " ";
-  };
-  check(allFinite(r.image.mean), "mean");
-  check(allFinite(r.image.half[0]) && allFinite(r.image.half[1]), "half");
-  check(allFinite(r.image.variance), "variance");
-  check(allFinite(r.error) && std::all_of(r.error.data.begin(), r.error.data.end(), [](float v) { return v >= 0; }),
-        "error");
-  for (const NamedPlane& p : r.aovs) check(allFinite(p.plane), p.name);
-  return bad;
-}
-
 bool finiteResult(const MethodResult& r) { return badPlanes(r).empty(); }
 
 bool sameBits(const MethodResult& a, const MethodResult& b) {

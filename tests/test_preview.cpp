@@ -8,7 +8,6 @@
 
 #include <arpa/inet.h>
 #include <doctest/doctest.h>
-#include <fcntl.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
@@ -31,46 +30,27 @@ namespace fs = braid::test::fs;
 
 namespace {
 
+std::vector<std::string> previewWords(const std::vector<std::string>& more) {
+  std::vector<std::string> words{"--http", "0", "--size", "48x32", "--threads", "1"};
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
 // `braid preview` of a small Cornell box at a free port.
-class Preview {
+class Preview : public test::Process {
  public:
-  explicit Preview(const Folder& folder, std::vector<std::string> more = {}) : out_(folder.path / "url") {
-    std::vector<std::string> words{BRAID_BINARY, "preview", kCornellFile, "-q",        "--http",
-                                   "0",          "--size",  "48x32",      "--threads", "1"};
-    words.insert(words.end(), more.begin(), more.end());
-    std::vector<char*> arguments;
-    for (std::string& w : words) arguments.push_back(w.data());
-    arguments.push_back(nullptr);
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, out_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    REQUIRE(posix_spawn(&child_, BRAID_BINARY, &actions, nullptr, arguments.data(), environ) == 0);
-    posix_spawn_file_actions_destroy(&actions);
-    REQUIRE(waitUntil([&] { return contains(readText(out_), "\n"); }));
-    const std::string url = readText(out_), head = "http://127.0.0.1:";
+  explicit Preview(const Folder& folder, const std::vector<std::string>& more = {})
+      : Process(previewWords(more), "preview", folder.path / "url") {
+    const fs::path printed = folder.path / "url";
+    REQUIRE(waitUntil([&] { return contains(readText(printed), "\n"); }));
+    const std::string url = readText(printed), head = "http://127.0.0.1:";
     REQUIRE(url.substr(0, head.size()) == head);
     port_ = std::stoi(url.substr(head.size()));
   }
-  ~Preview() {
-    if (child_ == 0) return;
-    ::kill(child_, SIGKILL);
-    waitpid(child_, nullptr, 0);
-  }
-  Preview(const Preview&) = delete;
-  Preview& operator=(const Preview&) = delete;
 
   int port() const { return port_; }
-  void signal(int number) const { REQUIRE(::kill(child_, number) == 0); }
-  int wait() {
-    int status = 0;
-    REQUIRE(waitpid(child_, &status, 0) == child_);
-    child_ = 0;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
-  }
 
  private:
-  fs::path out_;
-  pid_t child_ = 0;
   int port_ = 0;
 };
 

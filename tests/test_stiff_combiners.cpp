@@ -29,20 +29,6 @@ bool startsWith(const std::string& text, const char* prefix) { return text.rfind
 
 double value(const Rgb<float>& image, size_t c, size_t i) { return static_cast<double>(image[c][i]); }
 
-// The planes of a result that hold a value that is not finite, or a squared error below 0.
-std::string badPlanes(const MethodResult& r) {
-  std::string bad;
-  const auto check = [&bad](bool ok, const std::string& name) {
-    if (!ok) bad += name + " ";
-  };
-  check(allFinite(r.image.mean), "mean");
-  check(allFinite(r.image.half[0]) && allFinite(r.image.half[1]), "half");
-  check(allFinite(r.error), "error");
-  check(std::all_of(r.error.data.begin(), r.error.data.end(), [](float v) { return !(v < 0); }), "negative error");
-  for (const NamedPlane& p : r.aovs) check(allFinite(p.plane), p.name);
-  return bad;
-}
-
 // Weights and shrinkage factors beyond [0, 1], and weights of bases that do not sum to 1.
 std::string badFactors(const Method& m, const MethodResult& r) {
   std::string bad;
