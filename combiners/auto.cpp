@@ -54,6 +54,7 @@ class Auto : public Method {
     needs.quartersHelp = true;
     return needs;
   }
+  MethodMemory memory(const MemoryCase& of) const override;
   std::vector<OptionInfo> options() const override { return {kPatch, kFuse, kShrink, kDespike}; }
   MethodResult run(const MethodInputs& in) const override;
 };
@@ -64,6 +65,13 @@ Estimate asEstimate(std::vector<Rgb<float>> images, const char* name) {
   e.mean = std::move(images[0]);
   for (size_t h = 0; h + 1 < images.size(); ++h) e.half[h] = std::move(images[1 + h]);
   return e;
+}
+
+MethodMemory Auto::memory(const MemoryCase& of) const {
+  const int fused = of.photonMaps > 0 ? 102 : 0, others = of.bases - of.photonMaps;
+  if (of.passes > 0 && of.passes < kFewestPasses) return {96 + fused + 36 * others, 36};
+  const int bases = others + (of.passes > 0 && of.passes < kFirstOrderPasses ? 2 : 3);
+  return {114 + 80 * bases + fused, 40 + 8 * bases};
 }
 
 // The filters of x: a wide one, from 64 passes on its first-order fit, and last a careful one that takes no neighbour's

@@ -36,6 +36,7 @@ class Average : public Method {
     needs.halves = needs.variance = false;
     return needs;
   }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {36, 36}; }
 
   MethodResult run(const MethodInputs& in) const override {
     const auto collect = [&in](auto get) {

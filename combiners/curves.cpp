@@ -53,6 +53,10 @@ class Curves : public StoppingMethod {
     needs.halves = false;
     return needs;
   }
+  MethodMemory memory(const MemoryCase& of) const override {
+    if (of.passes > 0 && of.passes < 4) return {84, 44};
+    return {120, 44, 0, 36};
+  }
   std::vector<OptionInfo> options() const override { return {kStep, kSlope, kPoints, kMost, kMostRatio, kCurvesStop}; }
   uint64_t stop() const override { return stop_; }
   std::unique_ptr<Method> stoppedAfter(uint64_t passes) const override {

@@ -17,7 +17,8 @@ struct Spike {
 
 // The spikes of `image` (ALGORITHMS-BEYOND 8.3, step 6). A pixel is one if
 //   - the standard deviation of the unbiased mean, sqrt(mean_RGB v), is above 8 times its mean over 15x15 pixels;
-//   - the image is brighter there than all of its 5x5 neighbours that are no candidates and lie on the same surface, and
+//   - the image is brighter there than all of its 5x5 neighbours that are no candidates and lie on the same surface,
+//   and
 //     than the mean that would replace it;
 //   - the two darkest quarters of the unbiased estimate show less than 0.3 of the excess over the neighbours' mean:
 //     an outlier lives in one or two quarters, a thin lamp in all four.

@@ -132,6 +132,7 @@ class DoubleShrinkageMethod : public Method {
     needs.passes = 4;
     return needs;
   }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {268, 72}; }
   std::vector<OptionInfo> options() const override { return {kPrior, kStage, kStride, kOwnHalves}; }
   MethodResult run(const MethodInputs& in) const override;
 };

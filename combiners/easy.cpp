@@ -28,6 +28,7 @@ class Easy : public Method {
     needs.halves = false;
     return needs;
   }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {80, 44}; }
   std::vector<OptionInfo> options() const override { return {kStep}; }
   MethodResult run(const MethodInputs& in) const override;
 };

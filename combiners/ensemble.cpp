@@ -37,6 +37,10 @@ class Ensemble : public Method {
     needs.variance = false;
     return needs;
   }
+  MethodMemory memory(const MemoryCase& of) const override {
+    const bool quarters = of.passes == 0 || of.passes >= 4;
+    return {90 + (quarters ? 12 : 5) * of.bases, 40 + 4 * of.bases};
+  }
   std::vector<OptionInfo> options() const override { return {kPatch, kFilter, kShared, kNonNegative, kFullError}; }
   MethodResult run(const MethodInputs& in) const override;
 };

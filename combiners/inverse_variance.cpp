@@ -67,6 +67,7 @@ class InverseVariance : public Method {
     needs.biased = true;
     return needs;
   }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {76, 44}; }
   std::vector<OptionInfo> options() const override { return {kRadius}; }
   MethodResult run(const MethodInputs& in) const override;
 };

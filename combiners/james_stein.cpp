@@ -57,6 +57,7 @@ class JamesStein : public Method {
     needs.passes = 4;
     return needs;
   }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {220, 52}; }
   std::vector<OptionInfo> options() const override {
     return {kConstant, kRegression, kVariance, kSigma, kCrossed, kGlobal, kPositivePart, kStride, kGate};
   }

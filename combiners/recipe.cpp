@@ -298,7 +298,7 @@ Facts factsOf(const Estimates& all) {
     facts.estimates.push_back({e.name, e.unbiased, e.correlation, e.passes, !e.half[0].empty() && !e.half[1].empty(),
                                !e.variance.empty(), e.quarter.size() == 4 && (e.passes == 0 || e.passes >= 4),
                                history == all.history.end() ? 0 : static_cast<int>(history->second.size()),
-                               std::move(kept)});
+                               std::move(kept), !e.bias.empty()});
   }
   return facts;
 }

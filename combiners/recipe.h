@@ -52,6 +52,7 @@ struct EstimateFacts {
   bool halves = true, variance = true, quarters = false;
   int checkpoints = 0;
   std::vector<uint64_t> kept{};  // passes of the checkpoints with their image, rising
+  bool bias = false;             // whether there is an estimate of it
 };
 
 struct Facts {

@@ -30,6 +30,7 @@ class Uncorrelated : public Method {
     needs.variance = false;
     return needs;
   }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {50, 40}; }
   std::vector<OptionInfo> options() const override { return {kGamma}; }
   MethodResult run(const MethodInputs& in) const override;
 };

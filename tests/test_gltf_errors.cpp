@@ -129,6 +129,27 @@ TEST_CASE("gltf errors: URIs that leave the folder or the machine") {
   CHECK_ERROR(withUri("data:;base64,AAAA"), "/buffers/0/byteLength: is 36, but the data has 3 bytes");
 }
 
+TEST_CASE("gltf errors: symbolic links out of the folder") {
+  const Folder folder;
+  const std::string outside = folder.write("outside/a.bin", std::string(36, '\0'));
+  GltfFile file = triangleFile();
+  file.root["buffers"] = {{{"byteLength", 36}, {"uri", "a.bin"}}};
+  const std::string scene = folder.write("scene/scene.gltf", file.root.dump());
+  fs::create_symlink(outside, folder.path / "scene/a.bin");
+  const std::string text = errorOf([&] { loadGltf(scene); }, ExitCode::BadInput);
+  CHECK(contains(text, "/buffers/0/uri: 'a.bin' is a link out of the scene's folder; copy the file there"));
+  LoadOptions trusting;
+  trusting.allowExternal = true;
+  CHECK_NOTHROW(loadGltf(scene, trusting));
+  // Links that stay inside, and a scene that is a link itself, are no matter.
+  fs::remove(folder.path / "scene/a.bin");
+  folder.write("scene/data/b.bin", std::string(36, '\0'));
+  fs::create_symlink("data/b.bin", folder.path / "scene/a.bin");
+  CHECK_NOTHROW(loadGltf(scene));
+  fs::create_directory_symlink(folder.path / "scene", folder.path / "elsewhere");
+  CHECK_NOTHROW(loadGltf((folder.path / "elsewhere/scene.gltf").string()));
+}
+
 TEST_CASE("gltf errors: sizes that lie are refused before anything is allocated") {
   GltfFile file = triangleFile();
   Json& accessor = file.root["accessors"][0];

@@ -106,6 +106,8 @@ void addSceneOptions(CLI::App& command, SceneChoice& c) {
   command.add_option("--light-scale", c.lightScale, "Multiply every light and emitter of the file")
       ->capture_default_str();
   command.add_flag("--no-default-light", c.noDefaultLight, "No grey dome for a file without lights");
+  command.add_flag("--allow-external", c.load.allowExternal,
+                   "Follow symbolic links that lead from the scene's folder to elsewhere");
   command.add_flag("--double-sided", c.load.doubleSided, "Treat every material as double-sided");
   command.add_flag("--full", c.full, "Leave nothing out that the scene does not need (same pixels, for checking)");
   command.add_option("--isa", c.isa, "Instruction set for Embree: avx2, avx512, sse4.2, or 'auto'")

@@ -36,10 +36,26 @@ EstimateFacts plannedEstimate(const PlannedIntegrator& p, uint64_t rounds) {
           true,
           true,
           passes == 0 || passes >= 4,
-          checkpoints};
+          checkpoints,
+          {},
+          p.integrator->estimatesBias()};
 }
 
 }  // namespace
+
+Facts plannedFacts(const Plan& plan, uint64_t samples) {
+  Facts facts;
+  facts.features = plan.features;
+  for (const PlannedIntegrator& p : plan.integrators) {
+    EstimateFacts e = plannedEstimate(p, samples);
+    e.quarters = e.quarters && plan.buckets == 4;
+    if (!plan.settings.history) e.checkpoints = 0;
+    for (const uint64_t stop : plan.settings.stops)
+      if (e.unbiased && (samples == 0 || stop < e.passes)) e.kept.push_back(stop);
+    facts.estimates.push_back(std::move(e));
+  }
+  return facts;
+}
 
 std::vector<std::string> CombineChoice::wanted() const {
   return combine == "none" ? std::vector<std::string>{} : splitList(combine);

@@ -39,6 +39,9 @@ std::string methodList();
 // kept: quarters, features, history, images for the stop of denoising. Throws Error(Usage) for unknown names.
 Recipe planCombining(const CombineChoice& choice, uint64_t samples, Plan& plan);
 
+// What there will be of the estimates after a render of so many samples (0: not known) by this plan.
+Facts plannedFacts(const Plan& plan, uint64_t samples);
+
 // "+ js: of pt and nfor" or "- curves: needs 3 checkpoints of pt, which has 2", a line for each step.
 std::string recipeText(const Recipe& recipe);
 

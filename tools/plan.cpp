@@ -12,6 +12,7 @@
 #include "tools/cli.h"
 #include "tools/farm_job.h"
 #include "tools/image_output.h"
+#include "tools/memory_plan.h"
 #include "tools/output_options.h"
 
 namespace braid {
@@ -112,12 +113,9 @@ int runPlan(const PlanOptions& o) {
     fmt::print("{}", farmJobText(farmJob(o, plan.settings), parseFarmFormat(o.format)));
     return 0;
   }
-  const size_t memory[] = {scene->accel().bytes(), scene->geometryBytes(), scene->textureBytes()};
+  const MemoryPlan memory = planMemory(*scene, plan, recipe, settings.spp);
   if (!o.json) {
-    fmt::print("{}{}", plan.text(), recipeText(recipe));
-    fmt::print("memory: {:.1f} MiB hierarchies, {:.1f} MiB geometry, {:.1f} MiB textures\n",
-               static_cast<double>(memory[0]) / 1048576.0, static_cast<double>(memory[1]) / 1048576.0,
-               static_cast<double>(memory[2]) / 1048576.0);
+    fmt::print("{}{}{}", plan.text(), recipeText(recipe), memory.text());
     return 0;
   }
   nlohmann::json lines = nlohmann::json::array();
@@ -126,17 +124,11 @@ int runPlan(const PlanOptions& o) {
   nlohmann::json combiners = nlohmann::json::array();
   for (const Step& step : recipe.steps)
     combiners.push_back({{"kept", step.obstacle.empty()}, {"subject", step.name}, {"reason", step.obstacle}});
-  const nlohmann::json record = {{"schema", 1},
-                                 {"scene", o.scene.file},
-                                 {"traits", scene->traits().names()},
-                                 {"plan", lines},
-                                 {"combiners", combiners},
-                                 {"hash", hexString(plan.hash())},
-                                 {"memoryBytes",
-                                  {{"hierarchies", memory[0]},
-                                   {"geometry", memory[1]},
-                                   {"textures", memory[2]},
-                                   {"filmPerPixel", plan.filmBytesPerPixel}}}};
+  nlohmann::json bytes = {{"filmPerPixel", plan.filmBytesPerPixel}, {"total", memory.total()}};
+  for (const MemoryItem& item : memory.items) bytes[item.use] = item.bytes;
+  const nlohmann::json record = {{"schema", 1},         {"scene", o.scene.file},  {"traits", scene->traits().names()},
+                                 {"plan", lines},       {"combiners", combiners}, {"hash", hexString(plan.hash())},
+                                 {"memoryBytes", bytes}};
   fmt::print("{}\n", record.dump(2));
   return 0;
 }

@@ -14,6 +14,7 @@
 #include "tools/combining.h"
 #include "tools/header.h"
 #include "tools/interrupt.h"
+#include "tools/memory_plan.h"
 #include "tools/output_options.h"
 #include "tools/preview_board.h"
 #include "tools/preview_feed.h"
@@ -124,26 +125,23 @@ Recipe planPreview(Plan& plan, PreviewOptions& o, Audience& audience) {
   return recipe;
 }
 
-void tellSaved(const PreviewOptions& o, const RenderResult& result, const WrittenImage& written,
+void tellSaved(const PreviewOptions& o, const RunReport& result, const WrittenImage& written,
                const std::string& reason) {
   if (o.scene.quiet) return;
   for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
   for (const std::string& file : o.image.files()) fmt::print(stderr, "Saved: {}\n", file);
-  fmt::print(stderr, "{} spp in {}, {}stopped by {}\n", result.estimates->estimates.front().passes,
-             formatSeconds(result.seconds),
+  fmt::print(stderr, "{} spp in {}, {}stopped by {}\n", result.spp, formatSeconds(result.seconds),
              written.error ? fmt::format("estimated error {:.3g}, ", *written.error) : "", reason);
 }
 
 // The last images, combined from all samples, to the files and to whoever watches. Without files an interrupted
 // preview ends at once.
-WrittenImage save(const PreviewOptions& o, const Session& session, const RenderResult& result, Audience& audience,
+WrittenImage save(const PreviewOptions& o, const Session& session, const RunReport& result, Audience& audience,
                   bool interrupted) {
   if (interrupted && o.image.files().empty()) return {};
   audience.board().setPhase(PreviewPhase::Saving);
   ImageOutput output = o.image;
-  output.show = [&](const ImageViews& v) {
-    audience.show(result.estimates->estimates.front().passes, result.seconds, v);
-  };
+  output.show = [&](const ImageViews& v) { audience.show(result.spp, result.seconds, v); };
   return writeImage(output, describedEstimates(session, !o.image.noTiming), nullptr, o.samples.threads);
 }
 
@@ -163,22 +161,24 @@ int runPreview(PreviewOptions o) {
   const auto integrators = makeIntegrators();
   Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
   const Recipe recipe = planPreview(plan, o, audience);
+  const MemoryPlan memory = planMemory(*scene, plan, recipe, settings.spp);
+  requireWithinLimit(memory);
   Session session(*scene, std::move(plan));
   session.identify(BRAID_VERSION, BRAID_BUILD_FLAGS, sceneIdentity(o.scene, scene->data()),
                    planAttributes(*scene, session.plan(), scene->accel().isa()));
-  const std::string planText = session.plan().text() + recipeText(recipe);
+  const std::string planText = session.plan().text() + recipeText(recipe) + memory.text();
   if (o.scene.verbose) fmt::print(stderr, "{}", planText);
   audience.board().setPlan(planText, o.image.combine.combine, static_cast<int>(session.plan().integrators.size()));
   audience.board().setPhase(PreviewPhase::Rendering);
 
   ProgressLine line(o.scene.quiet);
-  RenderResult result;
+  RunReport result;
   {
     PreviewFeed feed(
         o.image.combine, session, settings.threads,
         [&](uint64_t spp, double seconds, const ImageViews& v) { audience.show(spp, seconds, v); },
         [&](const std::string& text) { audience.warn(text); });
-    result = session.run(
+    result = session.advance(
         [&](const Progress& p) {
           feed.round(p);
           audience.board().progress(p);

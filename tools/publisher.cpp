@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <new>
 #include <utility>
 
 #include "renderer/core/error.h"
@@ -14,6 +15,12 @@
 namespace braid {
 
 namespace {
+
+ImageOutput withoutCombining(ImageOutput output) {
+  output.combine.combine = "none";
+  output.combine.denoisers.clear();
+  return output;
+}
 
 uint64_t samplesOf(const FilmState& state) { return state.estimates.front().sums.passes(); }
 
@@ -114,11 +121,7 @@ void Publisher::publishImage(const Progress& p, bool combined) {
   const Stopwatch clock;
   cancel_ = false;
   pending_ = {samplesOf(session_.state()), p.seconds, combined, {}, {}};
-  auto output = std::make_shared<ImageOutput>(options_.image);
-  if (!combined) {
-    output->combine.combine = "none";
-    output->combine.denoisers.clear();
-  }
+  const auto output = std::make_shared<ImageOutput>(combined ? options_.image : withoutCombining(options_.image));
   auto shown = std::make_shared<Estimates>(describedEstimates(session_, !options_.image.noTiming));
   const auto alpha = std::make_shared<std::optional<Plane<float>>>(session_.alpha());
   heldUp_ = clock.seconds();
@@ -153,6 +156,12 @@ std::vector<Publication> Publisher::round(const Progress& p) {
   return news;
 }
 
+WrittenImage Publisher::writeNow(const ImageOutput& output) {
+  const std::optional<Plane<float>> alpha = session_.alpha();
+  return writeImage(output, describedEstimates(session_, !output.noTiming), alpha ? &*alpha : nullptr,
+                    options_.threads);
+}
+
 WrittenImage Publisher::finish() {
   cancel_ = true;
   imageJob_.wait();
@@ -167,9 +176,15 @@ WrittenImage Publisher::finish() {
   }
   WrittenImage written;
   if (hasImage()) {
-    const std::optional<Plane<float>> alpha = session_.alpha();
-    written = writeImage(options_.image, describedEstimates(session_, !options_.image.noTiming),
-                         alpha ? &*alpha : nullptr, options_.threads);
+    try {
+      written = writeNow(options_.image);
+    } catch (const std::bad_alloc&) {
+      if (!combines_) throw;
+      writeNow(withoutCombining(options_.image));
+      throw Error(ExitCode::OutOfMemory,
+                  "out of memory while combining; the image was saved without it: combine its file elsewhere (braid "
+                  "combine), or lower --size");
+    }
   }
   if (failure) std::rethrow_exception(failure);
   return written;

@@ -79,6 +79,7 @@ class Publisher {
   void saveState(const Progress& progress, std::vector<Publication>& news);
   void publishImage(const Progress& progress, bool combined);
   void giveUpIfTooLong(const Progress& progress);
+  WrittenImage writeNow(const ImageOutput& output);
   bool hasImage() const { return options_.image.show || !options_.image.files().empty(); }
 
   const PublishOptions options_;

@@ -14,6 +14,7 @@
 #include "tools/combining.h"
 #include "tools/header.h"
 #include "tools/interrupt.h"
+#include "tools/memory_plan.h"
 #include "tools/output_options.h"
 #include "tools/progress_line.h"
 #include "tools/publisher.h"
@@ -105,11 +106,11 @@ nlohmann::json errorOrNull(const std::optional<double>& error) {
   return error ? nlohmann::json(*error) : nlohmann::json(nullptr);
 }
 
-nlohmann::json resultRecord(const RenderResult& r, const RenderOptions& o, double loadSeconds, const Scene& scene,
+nlohmann::json resultRecord(const RunReport& r, const RenderOptions& o, double loadSeconds, const Scene& scene,
                             const WrittenImage& written) {
   return {{"status", r.reason == StopReason::Cancelled ? "interrupted" : "done"},
           {"reason", toString(r.reason)},
-          {"spp", r.estimates->estimates.front().passes},
+          {"spp", r.spp},
           {"estimatedError", errorOrNull(written.error)},
           {"seconds",
            {{"load", loadSeconds},
@@ -124,7 +125,7 @@ nlohmann::json resultRecord(const RenderResult& r, const RenderOptions& o, doubl
           {"outputs", o.files()}};
 }
 
-void tellResult(const RenderResult& r, const RenderOptions& o, const WrittenImage& written) {
+void tellResult(const RunReport& r, const RenderOptions& o, const WrittenImage& written) {
   for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
   if (r.rejected > 0) fmt::print(stderr, "warning: {} non-finite or negative samples counted as 0\n", r.rejected);
   if (r.firstRejected)
@@ -138,8 +139,8 @@ void tellResult(const RenderResult& r, const RenderOptions& o, const WrittenImag
     outputs += (outputs.empty() ? "" : ", ") + file;
   }
   const double perSecond = r.seconds > 0 ? 1e-6 / r.seconds : 0;
-  fmt::print(stderr, "{} spp in {} ({:.2f} M paths/s, {:.1f} M rays/s), {}stopped by {}: {}\n",
-             r.estimates->estimates.front().passes, formatSeconds(r.seconds), static_cast<double>(r.paths) * perSecond,
+  fmt::print(stderr, "{} spp in {} ({:.2f} M paths/s, {:.1f} M rays/s), {}stopped by {}: {}\n", r.spp,
+             formatSeconds(r.seconds), static_cast<double>(r.paths) * perSecond,
              static_cast<double>(r.rays + r.shadowRays) * perSecond,
              written.error ? fmt::format("estimated error {:.3g}, ", *written.error) : "", toString(r.reason), outputs);
 }
@@ -195,7 +196,7 @@ class Viewer {
 };
 
 // What the run comes to: interrupted, short of its target, or neither.
-int exitCode(const RenderResult& result, const RenderOptions& o, const WrittenImage& written) {
+int exitCode(const RunReport& result, const RenderOptions& o, const WrittenImage& written) {
   if (result.reason == StopReason::Cancelled) return static_cast<int>(ExitCode::Interrupted);
   if (o.error <= 0 || result.reason == StopReason::Error || (written.error && *written.error <= o.error)) return 0;
   fmt::print(stderr, "--error {} was not reached: the estimated error is {}: give more --spp or --time\n", o.error,
@@ -222,10 +223,12 @@ int runRender(const RenderOptions& o) {
   // The passes of all machines will be combined, of which a share has few.
   const Recipe recipe = planCombining(o.image.combine, settings.spp > 0 ? settings.spp + settings.firstRound : 0, plan);
   if (!o.image.files().empty()) requireRunnable(recipe, o.image.combine.wanted());
+  const MemoryPlan memory = planMemory(*scene, plan, recipe, settings.spp);
+  requireWithinLimit(memory);
   Session session(*scene, std::move(plan));
   session.identify(BRAID_VERSION, BRAID_BUILD_FLAGS, sceneIdentity(o.scene, scene->data()),
                    planAttributes(*scene, session.plan(), scene->accel().isa()));
-  const std::string planText = session.plan().text() + recipeText(recipe);
+  const std::string planText = session.plan().text() + recipeText(recipe) + memory.text();
   if (o.scene.verbose) fmt::print(stderr, "{}", planText);
   json.write("plan", {{"text", planText}, {"hash", hexString(session.plan().hash())}});
   if (earlier) session.resume(std::move(*earlier), o.resumeFile.empty() ? o.checkpoint : o.resumeFile);
@@ -233,7 +236,7 @@ int runRender(const RenderOptions& o) {
 
   ProgressLine line(o.scene.quiet);
   Publisher publisher({viewer.with(o.image), o.checkpoint, saveEvery, o.error, settings.threads}, session);
-  const RenderResult result = session.run(
+  const RunReport result = session.advance(
       [&](const Progress& p) {
         std::vector<Publication> news = publisher.round(p);
         viewer.addFailure(news);

@@ -32,6 +32,7 @@ class Box : public Method {
     needs.halves = needs.variance = false;
     return needs;
   }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {48, 36}; }
   std::vector<OptionInfo> options() const override { return {kRadius}; }
 
   MethodResult run(const MethodInputs& in) const override {

@@ -33,6 +33,9 @@ class External : public OutsideMethod {
     needs.halves = needs.variance = false;
     return needs;
   }
+  MethodMemory memory(const MemoryCase& /*of*/) const override {
+    return {static_cast<int>(files_.size()) * 24, static_cast<int>(files_.size()) * 12};
+  }
   std::string obstacle() const override;
   std::unique_ptr<Method> with(const std::string& parameter) const override;
   MethodResult run(const MethodInputs& in) const override;

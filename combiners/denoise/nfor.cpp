@@ -51,6 +51,7 @@ class Nfor : public Method {
     needs.variance = false;
     return needs;
   }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {520, 44}; }
   std::vector<OptionInfo> options() const override { return {kDemodulate, kOffsets, kVariance, kStride}; }
 
   MethodResult run(const MethodInputs& in) const override {

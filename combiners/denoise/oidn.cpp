@@ -121,6 +121,8 @@ class Oidn : public OutsideMethod {
     needs.halves = needs.variance = false;
     return needs;
   }
+  // The library's own memory is not known.
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {96, 36}; }
   std::string obstacle() const override { return api_ ? "" : reason_; }
 
   // A half is denoised with that half of the features, so that it stays independent of the other one.

@@ -40,6 +40,7 @@ class Rdfc : public Method {
     needs.halves = needs.variance = false;
     return needs;
   }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {496, 52}; }
   std::vector<OptionInfo> options() const override { return {kDemodulate, kVariance}; }
 
   MethodResult run(const MethodInputs& in) const override {

@@ -9,17 +9,23 @@ std::string joinProblems(const std::string& file, const std::vector<Problem>& pr
   std::string text;
   for (const Problem& p : problems) {
     if (!text.empty()) text += '\n';
-    text += file + ": ";
-    if (!p.place.empty()) text += p.place + ": ";
-    text += p.text;
+    text += printable(file + ": " + (p.place.empty() ? "" : p.place + ": ") + p.text);
   }
   return text;
 }
 
 }  // namespace
 
+std::string printable(std::string text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+  return text;
+}
+
+Error::Error(ExitCode code, const std::string& text) : std::runtime_error(printable(text)), code_(code) {}
+
 SceneError::SceneError(ExitCode code, std::string file, std::vector<Problem> problems)
-    : Error(code, joinProblems(file, problems)), problems_(std::move(problems)) {}
+    : Error(code, Lines{joinProblems(file, problems)}), problems_(std::move(problems)) {}
 
 SceneError::SceneError(ExitCode code, std::string file, std::string place, std::string text)
     : SceneError(code, std::move(file), std::vector<Problem>{{std::move(place), std::move(text)}}) {}

@@ -25,12 +25,22 @@ enum class ExitCode {
 // One line that names the file, the place in it and the mend; carries the exit code the command line should end with.
 class Error : public std::runtime_error {
  public:
-  Error(ExitCode code, const std::string& text) : std::runtime_error(text), code_(code) {}
+  // Control characters, which names in a file may hold, become '?': they could end the line or steer a terminal.
+  Error(ExitCode code, const std::string& text);
   ExitCode code() const { return code_; }
+
+ protected:
+  struct Lines {
+    std::string text;
+  };
+  Error(ExitCode code, const Lines& lines) : std::runtime_error(lines.text), code_(code) {}
 
  private:
   ExitCode code_;
 };
+
+// `text` with '?' for control characters.
+std::string printable(std::string text);
 
 // One problem of an input file.
 struct Problem {

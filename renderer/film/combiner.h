@@ -86,6 +86,21 @@ struct MethodResult {
   std::vector<Attribute> remarks;  // constants used and counts of fallbacks, for the header
 };
 
+// What the memory of a method depends on.
+struct MemoryCase {
+  uint64_t passes = 0;  // of the unbiased estimate; 0: not known
+  int bases = 0;        // images to choose from,
+  int photonMaps = 0;   // of which so many are biased estimates
+};
+
+// Bytes a pixel. The inputs are not counted.
+struct MethodMemory {
+  int peak = 0;               // at the most at a time, result included
+  int kept = 0;               // of the result
+  uint64_t eachThread = 0;    // bytes in all that every thread takes besides
+  int besideRedenoising = 0;  // held while Needs::redenoise runs
+};
+
 enum class MethodKind { Denoiser, Combiner };
 
 class Method {
@@ -95,6 +110,8 @@ class Method {
   virtual const char* description() const = 0;
   virtual MethodKind kind() const = 0;
   virtual Needs needs() const = 0;
+  // To 10 % (tests/test_combining_memory.cpp), without what Needs::redenoise takes.
+  virtual MethodMemory memory(const MemoryCase& of) const = 0;
   virtual std::vector<OptionInfo> options() const { return {}; }
   // Deterministic for any number of threads. A denoiser reads inputs.unbiased and inputs.features.
   virtual MethodResult run(const MethodInputs& inputs) const = 0;

@@ -11,6 +11,7 @@
 #include <OpenImageIO/imageio.h>
 
 #include "renderer/core/error.h"
+#include "renderer/core/image_limits.h"
 #include "renderer/core/parallel.h"
 #include "renderer/core/plane.h"
 #include "renderer/film/exr.h"
@@ -33,7 +34,7 @@ constexpr int kRowsPerRead = 64;
   throw Error(ExitCode::BadInput, path + ": " + line);
 }
 
-void checkSize(const std::string& path, const OIIO::ImageSpec& spec) {
+void checkSize(const std::string& path, uint64_t fileBytes, const OIIO::ImageSpec& spec) {
   const std::string size = std::to_string(spec.width) + "x" + std::to_string(spec.height);
   if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0) refuse(path, "empty image (" + size + ")");
   if (spec.deep) refuse(path, "deep images are not supported; flatten it first (oiiotool --flatten)");
@@ -43,6 +44,9 @@ void checkSize(const std::string& path, const OIIO::ImageSpec& spec) {
   if (spec.nchannels > kMaxChannels || pixels * spec.nchannels > kMaxValues)
     refuse(path, size + " pixels with " + std::to_string(spec.nchannels) +
                      " channels are more than the limit (4096 channels, 2^32 values); remove some channels");
+  if (!canHold(fileBytes, static_cast<uint64_t>(pixels * spec.nchannels)))
+    refuse(path, "claims " + size + " pixels in " + std::to_string(fileBytes) +
+                     " bytes, which cannot be: it is damaged; use another copy");
 }
 
 // 8- and 16-bit formats hold sRGB unless they say otherwise; float formats are linear.
@@ -132,7 +136,7 @@ void addPart(ImageFile& file, OIIO::ImageInput& in, int part) {
   }
 }
 
-ImageFile readOpened(const std::string& path, OIIO::ImageInput& in) {
+ImageFile readOpened(const std::string& path, uint64_t fileBytes, OIIO::ImageInput& in) {
   const OIIO::ImageSpec first = in.spec();
   ImageFile file;
   file.path = path;
@@ -144,7 +148,7 @@ ImageFile readOpened(const std::string& path, OIIO::ImageInput& in) {
   for (const OIIO::ParamValue& p : first.extra_attribs) file.attributes.push_back(toAttribute(p));
   int64_t values = 0;
   for (int part = 0; in.seek_subimage(part, 0); ++part) {
-    checkSize(path, in.spec());
+    checkSize(path, fileBytes, in.spec());
     values += int64_t(in.spec().width) * in.spec().height * in.spec().nchannels;
     if (values > kMaxValues) refuse(path, "its parts hold more than the limit of 2^32 values; remove some");
     addPart(file, in, part);
@@ -197,9 +201,10 @@ ImageFile readImage(const std::string& path) {
   hints.attribute("oiio:UnassociatedAlpha", 1);  // sRGB has to be decoded before colours are multiplied by alpha
   const auto in = OIIO::ImageInput::open(path, &hints);
   if (!in) refuse(path, "cannot be read as an image: " + OIIO::geterror());
-  checkSize(path, in->spec());
+  const uint64_t fileBytes = std::filesystem::file_size(path, ignored);
+  checkSize(path, fileBytes, in->spec());
   try {
-    return readOpened(path, *in);
+    return readOpened(path, fileBytes, *in);
   } catch (const std::bad_alloc&) {
     throw Error(ExitCode::OutOfMemory, path + ": not enough memory to read it; crop or resize it");
   }

@@ -70,6 +70,7 @@ SceneData describe(const Document& document) {
 
 SceneData loadGltf(const std::string& path, const LoadOptions& options, const LogSink& log) {
   Document document;
+  document.allowExternal = options.allowExternal;
   readDocument(document, path);
   SceneData scene = describe(document);
   MaterialTable materials(document, scene, options.doubleSided);

@@ -18,6 +18,7 @@ struct LoadOptions {
   std::optional<int> animation;    // none: all animations of the file play together from time 0
   bool defaultLight = true;        // add a grey dome to a file without any light or emitter
   bool doubleSided = false;        // treat every material as double-sided
+  bool allowExternal = false;      // follow symbolic links out of the folder of the file
   bool keepAllAttributes = false;  // --full: keep uv, colours and tangents that no material reads
 };
 

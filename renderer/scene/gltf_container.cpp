@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Files and bytes: reading a .gltf or .glb, URIs, buffers and meshopt-compressed views.
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -208,6 +209,15 @@ bool staysInside(std::string path) {
   return true;
 }
 
+// Whether the file lies in the folder once all symbolic links are followed. What cannot be resolved is not there.
+bool liesInside(const fs::path& folder, const fs::path& file) {
+  std::error_code error;
+  const fs::path root = fs::canonical(folder.empty() ? fs::path(".") : folder, error);
+  const fs::path target = error ? fs::path() : fs::canonical(file, error);
+  if (error) return true;
+  return std::mismatch(root.begin(), root.end(), target.begin(), target.end()).first == root.end();
+}
+
 }  // namespace
 
 uint64_t Document::sourceBytes() const {
@@ -260,6 +270,10 @@ std::optional<std::vector<uint8_t>> readUri(const Document& document, const std:
   // The decoded name is the right one; the others are what careless exporters mean.
   std::string firstReason;
   for (const std::string& name : {decoded, uri, slashes}) {
+    if (!document.allowExternal && !liesInside(document.folder, fs::path(document.folder) / name)) {
+      reason = quoted(decoded) + " is a link out of the scene's folder; copy the file there or give --allow-external";
+      return {};
+    }
     if (auto data = readFile(fs::path(document.folder) / name, reason)) return data;
     if (firstReason.empty()) firstReason = reason;
   }

@@ -141,6 +141,7 @@ struct SceneSource {
 // Texture references of materials hold the indices and uv sets of the file.
 struct Document {
   std::string path, folder;
+  bool allowExternal = false;  // links may lead out of the folder
   std::vector<uint8_t> bytes;  // the whole file
   Bytes json, binary;          // parts of `bytes`
   std::shared_ptr<const nlohmann::json> root;

@@ -9,6 +9,7 @@
 #include <OpenImageIO/imageio.h>
 
 #include "renderer/core/error.h"
+#include "renderer/core/image_limits.h"
 
 namespace braid {
 
@@ -149,7 +150,7 @@ int keptChannels(const OIIO::ImageSpec& spec) {
   return spec.nchannels;
 }
 
-void checkSize(const OIIO::ImageSpec& spec) {
+void checkSize(const OIIO::ImageSpec& spec, uint64_t fileBytes) {
   const std::string size = std::to_string(spec.width) + " x " + std::to_string(spec.height);
   if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1) {
     throw Error(ExitCode::BadInput, "is an image of " + size + " pixels; save it as a flat picture");
@@ -157,11 +158,16 @@ void checkSize(const OIIO::ImageSpec& spec) {
   if (static_cast<uint64_t>(spec.width) * static_cast<uint64_t>(spec.height) > kMaxPixels) {
     throw Error(ExitCode::BadInput, "is an image of " + size + " pixels, more than 2^28; make it smaller");
   }
+  const auto values = static_cast<uint64_t>(spec.image_pixels()) * static_cast<uint64_t>(spec.nchannels);
+  if (!canHold(fileBytes, values)) {
+    throw Error(ExitCode::BadInput, "claims " + size + " pixels in " + std::to_string(fileBytes) +
+                                        " bytes, which cannot be: it is damaged; save it again");
+  }
 }
 
-std::shared_ptr<const Image> readPixels(OIIO::ImageInput& input, const std::string& name) {
+std::shared_ptr<const Image> readPixels(OIIO::ImageInput& input, const std::string& name, uint64_t fileBytes) {
   const OIIO::ImageSpec spec = input.spec();
-  checkSize(spec);
+  checkSize(spec, fileBytes);
   auto image = std::make_shared<Image>();
   image->name = name;
   image->width = spec.width;
@@ -256,7 +262,7 @@ std::shared_ptr<const Image> decodeImage(const uint8_t* data, size_t bytes, cons
   const std::string format = formatName(data, bytes);
   OIIO::Filesystem::IOMemReader reader(data, bytes);
   const InputPointer input = openInput(format, &reader);
-  return readPixels(*input, name);
+  return readPixels(*input, name, bytes);
 }
 
 std::shared_ptr<const Image> readImageFile(const std::string& path) {
@@ -264,7 +270,7 @@ std::shared_ptr<const Image> readImageFile(const std::string& path) {
     throw Error(ExitCode::BadInput, path + ": is not a file that can be read; check the path");
   try {
     const InputPointer input = openInput(path, nullptr);
-    return readPixels(*input, path);
+    return readPixels(*input, path, OIIO::Filesystem::file_size(path));
   } catch (const Error& error) {
     throw Error(error.code(), path + ": " + error.what());
   }

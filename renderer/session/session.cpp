@@ -45,7 +45,7 @@ const char* toString(StopReason reason) {
 // One run: what lasts as long as the pass loop.
 class Session::Loop {
  public:
-  Loop(Session& session, const std::atomic<bool>* abandon, PassStatistics& statistics, RenderResult& result)
+  Loop(Session& session, const std::atomic<bool>* abandon, PassStatistics& statistics, RunReport& result)
       : session_(session),
         plan_(session.plan_),
         film_(session.film_),
@@ -132,7 +132,7 @@ class Session::Loop {
   FilmState& film_;
   const std::atomic<bool>* abandon_;
   PassStatistics& statistics_;
-  RenderResult& result_;
+  RunReport& result_;
   const Stopwatch clock_;
   PassTarget target_;
   std::vector<std::shared_ptr<const Preparation>> preparations_;
@@ -193,10 +193,10 @@ void Session::resume(FilmState state, const std::string& name) {
   film_ = std::move(state);
 }
 
-RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bool>* cancel,
-                          const std::atomic<bool>* abandon, const std::atomic<bool>* reached) {
+RunReport Session::advance(const ProgressCallback& progress, const std::atomic<bool>* cancel,
+                           const std::atomic<bool>* abandon, const std::atomic<bool>* reached) {
   PassStatistics statistics;
-  RenderResult result;
+  RunReport result;
   withThreads(plan_.settings.threads, [&] {
     Loop loop(*this, abandon, statistics, result);
     while (!loop.limitReached()) {
@@ -212,13 +212,23 @@ RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bo
       }
     }
     result.seconds = loop.seconds();
-    result.estimates = snapshot();
-    result.alpha = alpha();
   });
   result.paths = statistics.paths;
   result.rays = statistics.rays;
   result.shadowRays = statistics.shadowRays;
   result.rejected = film_.rejected();
+  result.spp = film_.estimates.front().sums.passes();
+  return result;
+}
+
+RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bool>* cancel,
+                          const std::atomic<bool>* abandon, const std::atomic<bool>* reached) {
+  RenderResult result;
+  static_cast<RunReport&>(result) = advance(progress, cancel, abandon, reached);
+  withThreads(plan_.settings.threads, [&] {
+    result.estimates = snapshot();
+    result.alpha = alpha();
+  });
   result.image = result.estimates->estimates.front().mean;
   return result;
 }

@@ -28,13 +28,12 @@ struct Progress {
   uint64_t rejected = 0;
 };
 
-struct RenderResult {
-  std::shared_ptr<const Estimates> estimates;
-  Rgb<float> image;                   // the headline
-  std::optional<Plane<float>> alpha;  // with a transparent background
+// What became of a run, without its images.
+struct RunReport {
   StopReason reason = StopReason::Samples;
   uint64_t rounds = 0;      // those of a resumed state included
   uint64_t firstRound = 0;  // how many of them were resumed
+  uint64_t spp = 0;         // of the first integrator, in all
   double seconds = 0;       // of the pass loop, in this run
   uint64_t paths = 0, rays = 0, shadowRays = 0;
   uint64_t rejected = 0;
@@ -45,6 +44,12 @@ struct RenderResult {
     int x = 0, y = 0;
   };
   std::optional<RejectedSample> firstRejected;
+};
+
+struct RenderResult : RunReport {
+  std::shared_ptr<const Estimates> estimates;
+  Rgb<float> image;                   // the headline
+  std::optional<Plane<float>> alpha;  // with a transparent background
 };
 
 class Session {
@@ -63,6 +68,9 @@ class Session {
   // pass in flight is dropped; `reached`, the image is as good as it was meant to be.
   RenderResult run(const ProgressCallback& progress = {}, const std::atomic<bool>* cancel = nullptr,
                    const std::atomic<bool>* abandon = nullptr, const std::atomic<bool>* reached = nullptr);
+  // The same without a copy of the estimates at the end.
+  RunReport advance(const ProgressCallback& progress = {}, const std::atomic<bool>* cancel = nullptr,
+                    const std::atomic<bool>* abandon = nullptr, const std::atomic<bool>* reached = nullptr);
 
   const Plan& plan() const { return plan_; }
   const TransportContext& context() const { return context_; }

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combiners/pipeline_memory.h"
+
+#include <algorithm>
+
+namespace braid {
+
+namespace {
+
+constexpr int kColour = 3 * sizeof(float);
+constexpr int kFeatureComponents = 3 + 3 + 1 + 1;  // albedo, normal, depth, visibility
+
+int imagesOf(const EstimateFacts& e) {
+  int bytes = kColour;
+  if (e.halves) bytes += 2 * kColour;
+  if (e.variance) bytes += kColour;
+  if (e.quarters) bytes += 4 * kColour;
+  if (e.bias) bytes += 2 * kColour;
+  return bytes;
+}
+
+int historyOf(const EstimateFacts& e) {
+  return e.checkpoints * kColour + static_cast<int>(e.kept.size()) * 3 * kColour;
+}
+
+MemoryCase caseOf(const Step& step, const Facts& facts) {
+  MemoryCase c;
+  if (const EstimateFacts* e = facts.find(step.unbiased)) c.passes = step.kept > 0 ? step.kept : e->passes;
+  c.bases = static_cast<int>(step.bases.size());
+  for (const std::string& base : step.bases)
+    if (const EstimateFacts* e = facts.find(base); e && e->bias) ++c.photonMaps;
+  return c;
+}
+
+// Of the step itself. A method that runs the denoiser of its input again holds that one's memory too, and a copy of the
+// estimate with another mean.
+MethodMemory memoryOf(const Step& step, const Recipe& recipe, const Facts& facts) {
+  MethodMemory memory = step.method->memory(caseOf(step, facts));
+  const Step* denoiser = recipe.find(step.biased);
+  const EstimateFacts* e = facts.find(step.unbiased);
+  if (!step.method->needs().redenoise || !denoiser || !e) return memory;
+  const MethodMemory again = denoiser->method->memory(caseOf(*denoiser, facts));
+  memory.peak = std::max(memory.peak, memory.besideRedenoising + again.peak + imagesOf(*e));
+  memory.eachThread = std::max(memory.eachThread, again.eachThread);
+  return memory;
+}
+
+}  // namespace
+
+int estimatesMemory(const Facts& facts) {
+  int bytes = facts.features ? 4 * kFeatureComponents * static_cast<int>(sizeof(float)) : 0;
+  for (const EstimateFacts& e : facts.estimates) bytes += imagesOf(e) + historyOf(e);
+  return bytes;
+}
+
+uint64_t pipelineMemory(const Recipe& recipe, const Facts& facts, uint64_t pixels, int threads) {
+  uint64_t kept = 0, peak = 0;  // bytes
+  for (const Step& step : recipe.steps) {
+    if (!step.obstacle.empty()) continue;
+    const MethodMemory memory = memoryOf(step, recipe, facts);
+    peak = std::max(
+        peak, kept + pixels * static_cast<uint64_t>(memory.peak) + memory.eachThread * static_cast<uint64_t>(threads));
+    kept += pixels * static_cast<uint64_t>(memory.kept);
+  }
+  return peak > 0 ? pixels * static_cast<uint64_t>(estimatesMemory(facts)) + peak : 0;
+}
+
+}  // namespace braid

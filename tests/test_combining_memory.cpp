@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// Methods take the memory that they say they take, and so does the pipeline.
+#include <doctest/doctest.h>
+
+#include "combiners/outside_method.h"
+#include "combiners/pipeline.h"
+#include "combiners/pipeline_memory.h"
+#include "combiners/registry.h"
+#include "tests/combiner_fixture.h"
+#include "tests/counted_memory.h"
+
+using namespace braid;
+using namespace braid::test;
+
+namespace {
+
+constexpr int kWidth = 384, kHeight = 256, kThreads = 2;
+
+double perPixel(int64_t bytes) { return static_cast<double>(bytes) / (kWidth * kHeight); }
+
+Case caseOf(uint64_t samples) {
+  CaseOptions options;
+  options.width = kWidth;
+  options.height = kHeight;
+  options.samples = samples;
+  return makeCase(options);
+}
+
+MethodInputs inputsOf(const Case& c, const std::vector<const char*>& bases) {
+  MethodInputs in;
+  in.unbiased = &c.pt();
+  in.correlated = &c.crn();
+  in.biased = &c.find("narrow");
+  in.features = &*c.estimates.features;
+  in.history = &c.estimates.history.at("pt");
+  in.redenoise = [](const Rgb<float>& image) { return image; };
+  for (const char* name : bases) in.bases.push_back(&c.find(name));
+  return in;
+}
+
+void checkMemory(const Method& method, const Case& c, const std::vector<const char*>& bases) {
+  const MethodInputs in = inputsOf(c, bases);
+  MemoryCase of{c.pt().passes, static_cast<int>(bases.size()), 0};
+  for (const Estimate* base : in.bases) of.photonMaps += base->bias.empty() ? 0 : 1;
+  const MethodMemory stated = method.memory(of);
+  const int64_t before = heapBytes();
+  resetHeapPeak();
+  const MethodResult result = method.run(in);
+  INFO(std::string(method.name()), " with ", bases.size(), " bases after ", of.passes, " passes");
+  const double threads = perPixel(static_cast<int64_t>(stated.eachThread) * kThreads);
+  CHECK(perPixel(heapPeak() - before) == doctest::Approx(stated.peak + threads).epsilon(0.1));
+  CHECK(perPixel(heapBytes() - before) == doctest::Approx(stated.kept).epsilon(0.1));
+}
+
+}  // namespace
+
+TEST_CASE("every method states its memory to 10 %") {
+  const std::vector<std::vector<const char*>> baseSets{
+      {}, {"narrow"}, {"narrow", "wide"}, {"sppm"}, {"sppm", "narrow"}, {"sppm", "narrow", "wide", "narrow"}};
+  for (const uint64_t samples : {2u, 16u, 64u}) {
+    const Case c = caseOf(samples);
+    withThreads(kThreads, [&] {
+      for (const auto& method : makeMethods()) {
+        if (dynamic_cast<const OutsideMethod*>(method.get())) continue;
+        const Needs needs = method->needs();
+        if (c.pt().passes < needs.passes) continue;
+        for (const auto& bases : baseSets)
+          if (static_cast<int>(bases.size()) >= needs.bases && (needs.anyBases || needs.bases > 0 || bases.empty()))
+            checkMemory(*method, c, bases);
+      }
+    });
+  }
+}
+
+TEST_CASE("the pipeline takes the memory that follows from a recipe") {
+  const Case c = caseOf(16);
+  const Facts facts = factsOf(c.estimates);
+  for (const std::vector<std::string>& wanted :
+       std::vector<std::vector<std::string>>{{"auto"}, {"js@nfor"}, {"ensemble@pw+nlm+rdfc"}, {"curves@nlm"}}) {
+    const uint64_t stated = pipelineMemory(makeRecipe(facts, wanted, {}), facts, kWidth * kHeight, kThreads);
+    const int64_t before = heapBytes();
+    resetHeapPeak();
+    withThreads(kThreads, [&] { runPipeline(c.estimates, wanted, {}); });
+    INFO(wanted[0]);
+    CHECK(static_cast<double>(heapPeak() - before) == doctest::Approx(static_cast<double>(stated)).epsilon(0.1));
+  }
+}
+
+TEST_CASE("estimates take the memory that follows from their facts") {
+  const Case c = caseOf(4);
+  const int64_t before = heapBytes();
+  const Estimates copy = c.estimates;
+  CHECK(perPixel(heapBytes() - before) == doctest::Approx(estimatesMemory(factsOf(copy))).epsilon(0.02));
+}

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a run takes in memory, worked out before it begins, and the limit that it is held to.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "combiners/recipe.h"
+#include "renderer/scene/scene.h"
+#include "renderer/session/plan.h"
+
+namespace braid {
+
+struct MemoryItem {
+  std::string use;
+  uint64_t bytes = 0;
+};
+
+struct MemoryPlan {
+  std::vector<MemoryItem> items;  // all held at once when memory is at its peak
+  uint64_t total() const;
+  // "memory: 1018 MiB at most: film 313 MiB, ...": one line, the largest first, nothing for items of less than 0.1 MiB.
+  std::string text() const;
+};
+
+// The peak of a render of so many samples (0: not known) whose results are published: the scene, the film, what
+// integrators need besides, the copy of the estimates that is published, and combining or writing it.
+MemoryPlan planMemory(const Scene& scene, const Plan& plan, const Recipe& recipe, uint64_t samples);
+
+// Bytes from "4G", "512M" or "1.5GiB" (all powers of 1024). Throws Error(Usage), also for less than 192 MiB.
+uint64_t parseBytes(const std::string& text);
+
+// Holds the memory of this process to so many bytes: what asks for more gets std::bad_alloc.
+void limitMemory(uint64_t bytes);
+
+// The limit that this process is under, by limitMemory() or from outside (ulimit -d).
+uint64_t memoryLimit();
+
+// Throws Error(OutOfMemory), naming what takes most, when the plan exceeds memoryLimit().
+void requireWithinLimit(const MemoryPlan& plan);
+
+}  // namespace braid
