@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "combiners/pipeline.h"
 
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -20,6 +21,17 @@ void addDifference(Rgb<float>& to, const Rgb<float>& a, const Rgb<float>& b) {
     parallelChunks(to[c].size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) to[c][i] += a[c][i] - b[c][i];
     });
+}
+
+double meanOf(const Rgb<float>& image) {
+  double sum = 0;
+  for (size_t c = 0; c < 3; ++c)
+    sum += parallelSum(image[c].size(), kPixelChunk, 0.0, [&](size_t begin, size_t end) {
+      double part = 0;
+      for (size_t i = begin; i < end; ++i) part += static_cast<double>(image[c][i]);
+      return part;
+    });
+  return sum / static_cast<double>(3 * image.size());
 }
 
 // The estimate with another mean; halves and quarters move with it.
@@ -173,11 +185,12 @@ void Runner::run(Step step) {
     const MethodInputs in = inputsOf(step);
     const Stopwatch clock;
     try {
-      out.result = step.method->run(in);
+      cancellable(in.cancel, [&] { out.result = step.method->run(in); });
     } catch (const Error& e) {
       step.obstacle = e.what();
     }
     out.seconds = clock.seconds();
+    out.meanOverUnbiased = meanOf(out.result.image.mean) / meanOf(in.unbiased->mean);
     out.inputSeconds = inputSeconds(step);
     const Estimate* unbiased = in.unbiased;
     Estimate& image = out.result.image;
@@ -222,7 +235,10 @@ PipelineResult runPipeline(const Estimates& estimates, const std::vector<std::st
     if (unbiased.empty()) unbiased = step.unbiased;
   runner.normalise(unbiased);
   runner.keepEarlier(recipe);
-  for (const Step& step : recipe.steps) runner.run(step);
+  for (const Step& step : recipe.steps) {
+    if (options.cancel && options.cancel->load()) break;
+    runner.run(step);
+  }
   runner.finish();
   return std::move(runner.result);
 }
@@ -243,14 +259,18 @@ std::vector<Attribute> remarksOf(const PipelineOutput& output, bool timing) {
     remark.name = prefix + remark.name;
     list.push_back(remark);
   }
-  if (timing)
-    for (const auto& [name, value] : {std::pair("seconds", output.seconds), {"inputSeconds", output.inputSeconds}}) {
-      Attribute a;
-      a.name = prefix + name;
-      a.kind = Attribute::Kind::Float;
-      a.number = value;
-      list.push_back(a);
-    }
+  const auto number = [&](const char* name, double value) {
+    Attribute a;
+    a.name = prefix + name;
+    a.kind = Attribute::Kind::Float;
+    a.number = value;
+    list.push_back(a);
+  };
+  if (std::isfinite(output.meanOverUnbiased)) number("meanOverUnbiased", output.meanOverUnbiased);
+  if (timing) {
+    number("seconds", output.seconds);
+    number("inputSeconds", output.inputSeconds);
+  }
   return list;
 }
 

@@ -22,15 +22,16 @@ struct PipelineOptions {
   // Factor of the exposure normalisation; 0: from the unbiased estimate. A series of checkpoints that is to be compared
   // keeps the first one's.
   double exposure = 0;
-  const std::atomic<bool>* cancel = nullptr;
+  const std::atomic<bool>* cancel = nullptr;  // once set, what is left to run is left out and the result worth nothing
 };
 
 // What one method made, or why it made nothing.
 struct PipelineOutput {
-  Step step;                // the method, its inputs by name, and the obstacle if it did not run
-  MethodResult result;      // in the units of the estimates; image.name is the step's name
-  double seconds = 0;       // of the method itself
-  double inputSeconds = 0;  // of the denoisers and combiners that it reads, each once
+  Step step;                    // the method, its inputs by name, and the obstacle if it did not run
+  MethodResult result;          // in the units of the estimates; image.name is the step's name
+  double seconds = 0;           // of the method itself
+  double meanOverUnbiased = 1;  // of the images: what part of the light is left; not a number for a black image
+  double inputSeconds = 0;      // of the denoisers and combiners that it reads, each once
   bool ran() const { return step.obstacle.empty(); }
 };
 
@@ -48,8 +49,8 @@ struct PipelineResult {
 PipelineResult runPipeline(const Estimates& estimates, const std::vector<std::string>& wanted,
                            const PipelineOptions& options);
 
-// Names of the inputs, constants, exposure and seconds of an output, for the header of a file: attributes named
-// "braid/<layer name>/…". `timing`: also seconds, which differ between runs.
+// Names of the inputs, constants, meanOverUnbiased, exposure and seconds of an output, for the header of a file:
+// attributes named "braid/<layer name>/…". `timing`: also seconds, which differ between runs.
 std::vector<Attribute> remarksOf(const PipelineOutput& output, bool timing);
 
 }  // namespace braid

@@ -68,7 +68,7 @@ double mapFilterSigma(const Rgb<float>& variance) {
   for (const Plane<float>& p : variance.channel) values.insert(values.end(), p.data.begin(), p.data.end());
   if (values.empty()) return 0.1;
   const auto kept = values.size() - static_cast<size_t>(kTrimmed * static_cast<double>(values.size()));
-  std::sort(values.begin(), values.end());
+  std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(kept), values.end());
   double sum = 0;
   for (size_t i = 0; i < kept; ++i) sum += static_cast<double>(values[i]);
   return 100 * std::clamp(std::sqrt(sum / static_cast<double>(kept)), 1e-3, 1.0);

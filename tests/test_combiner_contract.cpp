@@ -2,12 +2,16 @@
 // What every registered denoiser and combiner must keep: finite images from any input, the same bits for any number of
 // threads, behaviour that does not depend on the units of light, and names that users can type. The registry is
 // iterated, so a new method is covered by being in it.
+#include <atomic>
+#include <chrono>
 #include <cstring>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <regex>
 #include <set>
 #include <sstream>
+#include <thread>
 
 #include <doctest/doctest.h>
 #include <tbb/global_control.h>
@@ -17,6 +21,7 @@
 #include "combiners/pipeline.h"
 #include "combiners/registry.h"
 #include "renderer/core/error.h"
+#include "renderer/core/parallel.h"
 #include "renderer/film/exr.h"
 #include "tests/combiner_fixture.h"
 #include "tests/gltf_fixture.h"
@@ -257,6 +262,55 @@ TEST_CASE("The number of threads changes no bit of any method") {
     CHECK(sameBits(results[0], results[1]));
     CHECK(sameBits(results[0], results[2]));
   }
+}
+
+TEST_CASE("Every method ends soon after it is told to") {
+  const Case c = makeCase(sized(640, 400, 8));
+  const Estimates estimates = everything(c);
+  for (const auto& m : runnableMethods()) {
+    std::string name = m->name();
+    INFO(name);
+    const auto processorSeconds = [&](bool told) {
+      const std::atomic<bool> cancel{told};
+      Estimates many = estimates;
+      many.estimates[0].passes = 128;
+      MethodInputs in;
+      in.unbiased = &many.estimates[0];
+      in.biased = many.find("narrow");
+      in.correlated = many.find("crn");
+      in.features = &*many.features;
+      in.history = &many.history.at("pt");
+      in.bases = {many.find("narrow"), many.find("wide")};
+      in.redenoise = [](const Rgb<float>& image) { return image; };
+      in.cancel = &cancel;
+      const std::clock_t begin = std::clock();
+      cancellable(&cancel, [&] { m->run(in); });
+      return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+    };
+    // In seconds of all processors, which other programs do not slow down.
+    const double whole = processorSeconds(false), told = processorSeconds(true);
+    CHECK(told < std::max(0.1, 0.25 * whole));
+  }
+}
+
+TEST_CASE("A method that is told to end at any moment ends, and the pipeline goes on to nothing else") {
+  const Case c = makeCase(sized(160, 100));
+  const Estimates estimates = everything(c);
+  for (const auto& m : runnableMethods())
+    for (int delay = 0; delay < 4; ++delay) {
+      std::string name = m->name();
+      if (m->needs().biased) name += m->needs().redenoise ? "@box" : "@sppm";
+      std::atomic<bool> cancel{false};
+      PipelineOptions options = basesNamed();
+      options.cancel = &cancel;
+      std::thread user([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(3 * delay * delay));
+        cancel = true;
+      });
+      CHECK_NOTHROW(runPipeline(estimates, {name}, options));
+      user.join();
+      CHECK(runPipeline(estimates, {name}, options).outputs.empty());
+    }
 }
 
 TEST_CASE("Scaling all lights scales the image of every method and nothing else") {

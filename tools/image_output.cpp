@@ -142,8 +142,9 @@ WrittenImage writeImage(const ImageOutput& o, Estimates estimates, const Plane<f
   });
   for (const PipelineOutput& out : combined.outputs)
     if (out.ran())
-      written.timings.push_back(fmt::format("{} in {}, its inputs in {}", out.step.name, formatSeconds(out.seconds),
-                                            formatSeconds(out.inputSeconds)));
+      written.timings.push_back(fmt::format("{} in {}, its inputs in {}; its mean is {:.2f} % of that of {}",
+                                            out.step.name, formatSeconds(out.seconds), formatSeconds(out.inputSeconds),
+                                            100 * out.meanOverUnbiased, out.step.unbiased));
   return written;
 }
 

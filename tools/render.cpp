@@ -125,13 +125,18 @@ nlohmann::json resultRecord(const RunReport& r, const RenderOptions& o, double l
           {"outputs", o.files()}};
 }
 
+// How to look at the path, where `braid replay` can follow what lands in one pixel; or else where it is.
+std::string describe(const RunReport::RejectedSample& r, const RenderOptions& o) {
+  if (r.integrator != "pt" && r.integrator != "crn" && r.integrator != "bdpt")
+    return fmt::format("pass {} of {}, pixel {},{}", r.pass, r.integrator, r.x, r.y);
+  return fmt::format("braid replay {} --integrator {} --pass {} --pixel {},{} --size {} --seed {}", o.scene.file,
+                     r.integrator, r.pass, r.x, r.y, o.scene.size, o.samples.seed);
+}
+
 void tellResult(const RunReport& r, const RenderOptions& o, const WrittenImage& written) {
   for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
   if (r.rejected > 0) fmt::print(stderr, "warning: {} non-finite or negative samples counted as 0\n", r.rejected);
-  if (r.firstRejected)
-    fmt::print(stderr, "one of them: braid replay {} --integrator {} --pass {} --pixel {},{} --size {} --seed {}\n",
-               o.scene.file, r.firstRejected->integrator, r.firstRejected->pass, r.firstRejected->x, r.firstRejected->y,
-               o.scene.size, o.samples.seed);
+  if (r.firstRejected) fmt::print(stderr, "one of them: {}\n", describe(*r.firstRejected, o));
   for (const std::string& text : written.timings) fmt::print(stderr, "{}\n", text);
   std::string outputs;
   for (const std::string& file : o.files()) {

@@ -81,7 +81,7 @@ NlmWindowStore::NlmWindowStore(std::span<const NlmGuide> guides, int radius, int
       stride_(stride),
       columns_(centreCount(width_, stride)),
       rows_(centreCount(height_, stride)),
-      data_(offset(0, rows_) + WindowWeights::kRowSlack) {
+      data_(std::make_unique_for_overwrite<uint16_t[]>(offset(0, rows_) + WindowWeights::kRowSlack)) {
   if (zeroOrder) *zeroOrder = {Rgb<float>(width_, height_), Rgb<float>(width_, height_)};
   forEachTile(width_, height_, kTileWidth, kTileHeight,
               [&](const PixelRect& tile) { fillTile(guides, tile, image, zeroOrder); });
@@ -113,14 +113,14 @@ void NlmWindowStore::storeOffset(const float* weights, int dx, int dy, const Pix
   const int firstColumn = firstAt(tile.x0, width_), endColumn = firstAt(tile.x1, width_);
   for (int r = firstAt(tile.y0, height_), endRow = firstAt(tile.y1, height_); r < endRow; ++r) {
     const float* in = weights + static_cast<ptrdiff_t>(centrePosition(r, height_, stride_) - tile.y0) * tile.width();
-    uint16_t* out = data_.data() + offset(firstColumn, r) + entry;
+    uint16_t* out = data_.get() + offset(firstColumn, r) + entry;
     for (int k = firstColumn; k < endColumn; ++k, out += side_ * side_)
       *out = static_cast<uint16_t>(in[centrePosition(k, width_, stride_) - tile.x0] * kOne + 0.5f);
   }
 }
 
 void NlmWindowStore::row(int cx, int cy, int y, int x0, int x1, bool halfSensitivity, float* out) const {
-  const uint16_t* __restrict in = data_.data() + offset(cx / stride_, cy / stride_) +
+  const uint16_t* __restrict in = data_.get() + offset(cx / stride_, cy / stride_) +
                                   static_cast<size_t>((y - cy + radius_) * side_ + x0 - cx + radius_);
   // Whole vectors: what lies past the end is the next row's, or the slack of the store.
   const int count = (x1 - x0 + WindowWeights::kRowSlack - 1) / WindowWeights::kRowSlack * WindowWeights::kRowSlack;

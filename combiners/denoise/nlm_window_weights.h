@@ -9,6 +9,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -38,7 +39,9 @@ class NlmWindowStore {
   void storeOffset(const float* weights, int dx, int dy, const PixelRect& tile);
 
   int width_, height_, radius_, side_, stride_, columns_, rows_;
-  std::vector<uint16_t> data_;  // window after window, row by row; entries outside the image are not read
+  // Window after window, row by row. Not initialised, which would take longer than all else: of entries outside the
+  // image nobody uses the values.
+  std::unique_ptr<uint16_t[]> data_;
 };
 
 // A store at the sensitivity of its guides or at half of it.

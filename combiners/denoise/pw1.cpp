@@ -32,9 +32,10 @@ class PatchWelchFirstOrder : public Method {
     options.threshold = thresholdOf(in, kThreshold);
     options.stride = static_cast<int>(std::clamp(in.options.number(kStride), 1.0, 1.0 * kPatchWelchWindow));
     const auto zeroOrder = patchWelch(input, std::array{options.threshold}, {}, in.cancel);
-    MethodResult result = patchWelchResult(patchWelchFirstOrder(input, zeroOrder[0], options, in.cancel));
+    RegressionReport report;
+    MethodResult result = patchWelchResult(patchWelchFirstOrder(input, zeroOrder[0], options, in.cancel, &report));
     result.remarks = {numberAttribute(kThreshold.name, options.threshold),
-                      numberAttribute(kStride.name, options.stride)};
+                      numberAttribute(kStride.name, options.stride), report.attribute("pw1-regression")};
     return result;
   }
 };

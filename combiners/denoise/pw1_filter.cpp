@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <memory>
+#include <mutex>
 
 #include "combiners/normal_equations.h"
 #include "renderer/core/error.h"
@@ -169,12 +170,17 @@ class TileRegression {
       for (int x = firstMultiple(centres.x0); x < centres.x1; x += stride_) {
         gather(x, y);
         prepare(x, y);
+        const bool own = x >= target_.x0 && x < target_.x1 && y >= target_.y0 && y < target_.y1;
         for (size_t i = 0; i < radiance_.size(); ++i) {
-          fit(i);
+          const NormalSolution solution = fit(i);
+          if (own) count(solution);
           scatter(x, y, sums_[i]);
         }
       }
   }
+
+  // Of the fits whose centres lie in the tile.
+  RegressionReport report;
 
   // Blends with the zero-order results.
   void write(const std::vector<Rgb<float>>& zeroOrder, float kappa, std::vector<Rgb<float>>& out) const {
@@ -247,8 +253,15 @@ class TileRegression {
       }
   }
 
+  void count(const NormalSolution& solution) {
+    ++report.models;
+    report.raisedRidge += solution.raisedRidge && !solution.constant;
+    report.constantModels += solution.constant;
+    report.maxCondition = std::max(report.maxCondition, solution.condition);
+  }
+
   // Weights, normal equations and predictions of one image.
-  void fit(size_t image) {
+  NormalSolution fit(size_t image) {
     const float scale = 1.0f / (3 * squaredThreshold_ * PatchWelchInput::varianceFactor(image));
     weightsOf(patches_[image].v, inverseCount_.v, edge_.v, scale, weights_.v);
     const auto& radiance = radiance_[image];
@@ -269,6 +282,7 @@ class TileRegression {
       for (size_t k = 1; k < kColumns; ++k)
         addScaled(columns_[k].v, static_cast<float>(solution.coefficients[k][c]), prediction_[c].v);
     }
+    return solution;
   }
 
   void scatter(int x, int y, std::array<std::vector<float>, 4>& sums) {
@@ -302,15 +316,20 @@ class TileRegression {
 }  // namespace
 
 std::vector<Rgb<float>> patchWelchFirstOrder(const PatchWelchInput& input, const std::vector<Rgb<float>>& zeroOrder,
-                                             const FirstOrderOptions& options, const std::atomic<bool>* cancel) {
+                                             const FirstOrderOptions& options, const std::atomic<bool>* cancel,
+                                             RegressionReport* report) {
   BRAID_ASSERT(!input.images.empty() && input.images.size() <= PatchWelchInput::kMaxImages &&
                zeroOrder.size() == input.images.size() && options.stride >= 1 && options.tileSize >= 1);
   std::vector<Rgb<float>> out(input.images.size(), Rgb<float>(input.width(), input.height()));
+  std::mutex reporting;
   forEachTile(input.width(), input.height(), options.tileSize, options.tileSize, [&](const PixelRect& tile) {
     if (cancel && cancel->load(std::memory_order_relaxed)) return;
     const auto regression = std::make_unique<TileRegression>(input, options, tile);
     runVectorised([&] { regression->run(); });
     regression->write(zeroOrder, options.kappa, out);
+    if (!report) return;
+    const std::lock_guard lock(reporting);
+    *report += regression->report;
   });
   return out;
 }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "combiners/denoise/pw_filter.h"
+#include "combiners/regression.h"
 
 namespace braid {
 
@@ -24,8 +25,10 @@ struct FirstOrderOptions {
 
 // Filters each image of `input` with its own weights; `zeroOrder` holds the results of patchWelch() with the same
 // threshold. Deterministic; the size of the tiles changes no bit. Once `cancel` is set, tiles stay black.
+// `report` gets the counts of the fits, of all images.
 std::vector<Rgb<float>> patchWelchFirstOrder(const PatchWelchInput& input, const std::vector<Rgb<float>>& zeroOrder,
                                              const FirstOrderOptions& options = {},
-                                             const std::atomic<bool>* cancel = nullptr);
+                                             const std::atomic<bool>* cancel = nullptr,
+                                             RegressionReport* report = nullptr);
 
 }  // namespace braid

@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/core/parallel.h"
 
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
+#include <tbb/task_group.h>
 
 namespace braid {
 
@@ -19,6 +25,44 @@ void parallelBoth(const std::function<void()>& one, const std::function<void()>&
 void withThreads(int threads, const std::function<void()>& task) {
   tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
   arena.execute(task);
+}
+
+namespace {
+
+// Looks at a flag every few milliseconds, on a thread of its own, and cancels a context once it is set.
+class CancelWatch {
+ public:
+  CancelWatch(const std::atomic<bool>& cancel, tbb::task_group_context& context)
+      : thread_([this, &cancel, &context] {
+          std::unique_lock lock(mutex_);
+          while (!wake_.wait_for(lock, std::chrono::milliseconds(5), [this] { return over_; }))
+            if (cancel.load()) context.cancel_group_execution();
+        }) {}
+  ~CancelWatch() {
+    {
+      const std::lock_guard lock(mutex_);
+      over_ = true;
+    }
+    wake_.notify_one();
+    thread_.join();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool over_ = false;
+  std::thread thread_;
+};
+
+}  // namespace
+
+void cancellable(const std::atomic<bool>* cancel, const std::function<void()>& task) {
+  if (!cancel) return task();
+  // The context of loops inside of a task is that of the task.
+  tbb::task_group_context context;
+  const CancelWatch watch(*cancel, context);
+  tbb::parallel_for(
+      0, 1, [&](int) { task(); }, context);
 }
 
 int machineThreads() { return tbb::info::default_concurrency(); }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <functional>
 #include <vector>
@@ -49,6 +50,10 @@ void parallelBoth(const std::function<void()>& one, const std::function<void()>&
 
 // Runs the task, and the loops in it, on at most so many threads; 0: as many as the machine has.
 void withThreads(int threads, const std::function<void()>& task);
+
+// Runs the task; soon after `cancel` is set, all loops in it skip what is left of them, so that it ends as early as the
+// code between its loops lets it. What it makes is worth nothing then. Null: it cannot be cancelled.
+void cancellable(const std::atomic<bool>* cancel, const std::function<void()>& task);
 
 // Threads that the machine runs at once.
 int machineThreads();
