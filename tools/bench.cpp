@@ -14,6 +14,7 @@
 #include "renderer/core/parallel.h"
 #include "renderer/core/stopwatch.h"
 #include "tools/bench_combining.h"
+#include "tools/bench_publishing.h"
 #include "tools/builtin_scenes.h"
 #include "tools/cli.h"
 #include "version.h"
@@ -25,7 +26,7 @@ namespace {
 struct BenchOptions {
   std::vector<std::string> scenes;
   SampleChoice samples;
-  std::string size = "512x512", isa = "avx2", combine;
+  std::string size = "512x512", isa = "avx2", combine, publish;
   int repeats = 5;
   bool json = false;
 };
@@ -211,7 +212,7 @@ std::vector<SceneSource> sourcesOf(const BenchOptions& o) {
                            return loadScene(choice);
                          }});
   }
-  if (sources.empty()) sources = o.combine.empty() ? builtin : std::vector{builtin[0]};
+  if (sources.empty()) sources = o.combine.empty() && o.publish.empty() ? builtin : std::vector{builtin[0]};
   return sources;
 }
 
@@ -240,11 +241,37 @@ int runCombiningBench(const BenchOptions& o, const Settings& settings) {
   return 0;
 }
 
+// What is published while a render goes on, and at its end, against the passes alone.
+int runPublishingBench(const BenchOptions& o, const Settings& settings) {
+  nlohmann::json all = nlohmann::json::array();
+  for (const SceneSource& source : sourcesOf(o)) {
+    SceneChoice choice;
+    choice.isa = o.isa;
+    SceneData data = source.load();
+    const CameraData camera = chooseCamera(data, choice);
+    const std::unique_ptr<Scene> scene = buildScene(std::move(data), choice);
+    nlohmann::json r = benchPublishing(*scene, camera, settings, o.publish, o.repeats);
+    if (!o.json)
+      fmt::print(
+          "{}: {}x{}, {} spp: {:.2f} s, with {:.1f} publications ({:.1f} combined) {:.2f} s: {:+.1f} %; of "
+          "processor time {:+.1f} %\n",
+          source.name, settings.width, settings.height, settings.spp, r["seconds"].get<double>(),
+          r["publications"].get<double>(), r["combinedPublications"].get<double>(), r["publishedSeconds"].get<double>(),
+          100 * r["overhead"].get<double>(), 100 * r["processorOverhead"].get<double>());
+    r["scene"] = source.name;
+    all.push_back(std::move(r));
+  }
+  if (o.json)
+    fmt::print("{}\n", nlohmann::json({{"schema", 1}, {"build", BRAID_BUILD_FLAGS}, {"publishing", all}}).dump(2));
+  return 0;
+}
+
 int runBench(const BenchOptions& o) {
   SceneChoice view;
   view.size = o.size;
   Settings settings = makeSettings(view, o.samples);
   if (!o.combine.empty()) return runCombiningBench(o, settings);
+  if (!o.publish.empty()) return runPublishingBench(o, settings);
   settings.features = false;
   const std::vector<SceneSource> sources = sourcesOf(o);
   nlohmann::json all = nlohmann::json::array();
@@ -301,6 +328,8 @@ void addBench(CLI::App& app, Action& action) {
       ->capture_default_str();
   command->add_option("--combine", o.combine,
                       "Measure these denoisers and combiners, separated by commas, instead of rays");
+  command->add_option("--publish", o.publish,
+                      "Measure what publishing images combined by these adds to the passes, instead of rays");
   command->add_flag("--json", o.json, "As JSON");
   addSampleOptions(*command, o.samples);
   command->callback([options, &action] { action = [options] { return runBench(*options); }; });

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `braid preview`: watch a scene converge, in a browser or in tev; noisy, combined and error side by side.
+#include <sys/resource.h>
+
 #include <chrono>
 #include <filesystem>
 #include <thread>
@@ -154,6 +156,9 @@ int runPreview(PreviewOptions o) {
   const std::atomic<bool>& interrupted = installInterruptHandler();
   std::atomic<bool> stop{false};
   Audience audience(o, stop);
+  // From here on: the browser that shows the image, and the threads that serve it, go before those that make it, which
+  // inherit this.
+  setpriority(PRIO_PROCESS, 0, 5);
 
   SceneData data = loadScene(o.scene);
   const CameraData camera = chooseCamera(data, o.scene);

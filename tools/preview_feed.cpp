@@ -44,14 +44,14 @@ void PreviewFeed::collect(BackgroundJob& job) {
 void PreviewFeed::round(const Progress& p) {
   collect(noisyJob_);
   collect(combineJob_);
-  if (p.seconds < nextNoisy_ || noisyJob_.running()) return;
+  if (p.seconds < nextNoisy_ || !noisyJob_.idle()) return;
   const Stopwatch clock;
   const Snapshot snapshot = session_.snapshot();
   nextNoisy_ = p.seconds + std::max(kInterval, clock.seconds() / kHeldUpShare);
   showNoisy(snapshot, p.seconds);
   const double pause = combineTook_ / kCombiningShare;
   // With one sample there is nothing yet that a method could tell noise from.
-  if (combines_ && samplesOf(*snapshot) >= 2 && !combineJob_.running() &&
+  if (combines_ && samplesOf(*snapshot) >= 2 && combineJob_.idle() &&
       (combineBegan_ < 0 || p.seconds >= combineBegan_ + pause))
     combine(snapshot, p.seconds);
 }

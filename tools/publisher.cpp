@@ -27,7 +27,7 @@ uint64_t samplesOf(const FilmState& state) { return state.estimates.front().sums
 }  // namespace
 
 void BackgroundJob::start(std::function<void()> task) {
-  BRAID_ASSERT(!thread_.joinable());
+  BRAID_ASSERT(idle());
   done_ = false;
   failure_ = nullptr;
   thread_ = std::thread([this, task = std::move(task)] {
@@ -148,8 +148,8 @@ std::vector<Publication> Publisher::round(const Progress& p) {
   collect(news);
   giveUpIfTooLong(p);
   PublicationSchedule::Due due = schedule_.due(p);
-  due.image = due.image && hasImage() && !imageJob_.running();
-  due.state = due.state && !options_.checkpoint.empty() && !stateJob_.running();
+  due.image = due.image && hasImage() && imageJob_.idle();
+  due.state = due.state && !options_.checkpoint.empty() && stateJob_.idle();
   if (due.state) saveState(p, news);
   if (due.image) publishImage(p, due.combined);
   schedule_.begun(due, p);

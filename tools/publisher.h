@@ -24,7 +24,9 @@ class BackgroundJob {
  public:
   ~BackgroundJob() { wait(); }
   bool running() const { return thread_.joinable() && !done_.load(); }
-  // The one before must have ended.
+  // Nothing is under way, and what was has been collected.
+  bool idle() const { return !thread_.joinable(); }
+  // Must be idle.
   void start(std::function<void()> task);
   void wait();
   // Once after the task has ended: true, and what it threw if anything.

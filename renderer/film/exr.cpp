@@ -160,7 +160,7 @@ OIIO::ImageSpec makeSpec(const Estimates& estimates, const std::vector<ExrChanne
   spec.full_width = estimates.fullWidth > 0 ? estimates.fullWidth : width;
   spec.full_height = estimates.fullHeight > 0 ? estimates.fullHeight : height;
 
-  spec.attribute("compression", "zip");
+  spec.attribute("compression", "zip:1");
   // OpenImageIO adds the date of writing when there is none; files must reproduce byte for byte, and an empty date is
   // the way to have none.
   spec.attribute("DateTime", "");

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// What publishing and combining cost a render.
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "renderer/scene/scene.h"
+#include "renderer/session/settings.h"
+
+namespace braid {
+
+// Renders `settings.spp` samples `repeats` times in turn: passes alone, and as `render -o FILE.exr --combine METHODS`
+// does it, with all that is published on the way and at the end, files included (in the folder for temporary files).
+// Medians of the wall-clock seconds and of the processor seconds of both, and what the second takes more, as a share of
+// the first. Throws Error(Usage) for unknown names.
+nlohmann::json benchPublishing(const Scene& scene, const CameraData& camera, const Settings& settings,
+                               const std::string& methods, int repeats);
+
+}  // namespace braid
