@@ -117,18 +117,25 @@ Estimate consistentHalves(const Estimate& base) {
   return out;
 }
 
-// x shrunk towards a base, and each half towards the base's half.
-Estimate shrunkTowards(const Estimate& base, const Estimate& x, const Rgb<float>& variance,
-                       const Rgb<float> (&halfVariances)[2]) {
+// x shrunk towards each base, and each half of x towards the base's half.
+std::vector<Estimate> shrunkTowards(const std::vector<Estimate>& bases, const Estimate& x, const Rgb<float>& variance) {
   JamesSteinSettings settings;
   settings.constant = 1;
   settings.gate = true;
   settings.shared = true;
   settings.filter = VarianceFilter::Whitened;
-  Estimate out;
-  out.name = "js@" + base.name;
-  out.mean = jamesStein(x.mean, variance, base.mean, settings).image;
-  for (int h = 0; h < 2; ++h) out.half[h] = jamesStein(x.half[h], halfVariances[h], base.half[h], settings).image;
+  std::vector<Estimate> out(bases.size());
+  for (size_t b = 0; b < bases.size(); ++b) out[b].name = "js@" + bases[b].name;
+  const auto shrink = [&](const Rgb<float>& image, const Rgb<float>& noise, const auto& partOf) {
+    const NoiseScale scale = noiseScale(noise, settings);
+    for (size_t b = 0; b < bases.size(); ++b)
+      partOf(out[b]) = jamesStein(image, noise, scale, partOf(bases[b]), settings).image;
+  };
+  shrink(
+      x.mean, variance, [](auto& e) -> auto& { return e.mean; });
+  for (size_t h = 0; h < 2; ++h)
+    shrink(
+        x.half[h], halfVariance(x, variance, static_cast<int>(h)), [h](auto& e) -> auto& { return e.half[h]; });
   return out;
 }
 
@@ -186,10 +193,8 @@ MethodResult Auto::run(const MethodInputs& in) const {
     return result;
   }
   const Rgb<float> variance = meanVariance(x);
-  const Rgb<float> halfVariances[2] = {halfVariance(x, variance, 0), halfVariance(x, variance, 1)};
   std::vector<Estimate> shrunk;
-  if (in.options.number(kShrink) != 0)
-    for (const Estimate& base : bases) shrunk.push_back(shrunkTowards(base, x, variance, halfVariances));
+  if (in.options.number(kShrink) != 0) shrunk = shrunkTowards(bases, x, variance);
   std::vector<const Estimate*> candidates;
   for (const Estimate& e : shrunk) candidates.push_back(&e);
   for (const Estimate& e : bases) candidates.push_back(&e);

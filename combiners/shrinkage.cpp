@@ -103,30 +103,31 @@ Plane<double> factors(const Plane<double>& squares, const Plane<double>& varianc
   return mirrorBoxMean(factor, s.radius);
 }
 
-// Pixels whose standard deviation is beyond 5 times that of their surroundings although X and Y differ by less than 4
-// of them: one sample carries them, and X says nothing that Y would contradict. The surroundings' is the square of the
-// mean root, so that a dozen outliers in a window do not hide each other.
-std::vector<char> gated(const Rgb<float>& x, const Rgb<float>& variance, const Rgb<float>& y, int radius) {
-  Plane<double> deviation(x.width(), x.height());
-  forAll(x.size(), [&](size_t i) {
+// Standard deviations, over the channels, of pixels and of their surroundings. The latter is the square of the mean
+// root, so that a dozen outliers in a window do not hide each other.
+void addDeviations(const Rgb<float>& variance, int radius, NoiseScale& scale) {
+  scale.deviation = Plane<double>(variance.width(), variance.height());
+  Plane<double> roots(variance.width(), variance.height());
+  forAll(roots.size(), [&](size_t i) {
     double v = 0;
     for (size_t c = 0; c < 3; ++c) v += static_cast<double>(variance[c][i]) / 3;
-    deviation[i] = std::sqrt(v);
+    scale.deviation[i] = std::sqrt(v);
+    roots[i] = std::sqrt(scale.deviation[i]);
   });
-  Plane<double> roots(x.width(), x.height());
-  forAll(x.size(), [&](size_t i) { roots[i] = std::sqrt(deviation[i]); });
-  Plane<double> around = mirrorBoxMean(roots, radius);
-  forAll(x.size(), [&](size_t i) { around[i] *= around[i]; });
-  std::vector<char> gate(x.size());
-  forAll(x.size(), [&](size_t i) {
-    double square = 0;
-    for (size_t c = 0; c < 3; ++c) {
-      const double d = static_cast<double>(x[c][i]) - static_cast<double>(y[c][i]);
-      square += d * d / 3;
-    }
-    gate[i] = deviation[i] > 5 * around[i] && std::sqrt(square) < 4 * deviation[i];
-  });
-  return gate;
+  scale.around = mirrorBoxMean(roots, radius);
+  forAll(roots.size(), [&](size_t i) { scale.around[i] *= scale.around[i]; });
+}
+
+// Whether the standard deviation of a pixel is beyond 5 times that of its surroundings although X and Y differ by less
+// than 4 of them: one sample carries it, and X says nothing that Y would contradict.
+bool gated(const NoiseScale& scale, const Rgb<float>& x, const Rgb<float>& y, size_t i) {
+  if (scale.deviation.empty() || !(scale.deviation[i] > 5 * scale.around[i])) return false;
+  double square = 0;
+  for (size_t c = 0; c < 3; ++c) {
+    const double d = static_cast<double>(x[c][i]) - static_cast<double>(y[c][i]);
+    square += d * d / 3;
+  }
+  return std::sqrt(square) < 4 * scale.deviation[i];
 }
 
 }  // namespace
@@ -137,35 +138,45 @@ double shrinkageFactor(double numerator, double sumOfSquares, bool positivePart)
   return positivePart ? std::max(0.0, factor) : factor;
 }
 
+NoiseScale noiseScale(const Rgb<float>& variance, const JamesSteinSettings& settings) {
+  NoiseScale scale;
+  if (settings.filter == VarianceFilter::Whitened)
+    for (size_t c = 0; c < 3; ++c) scale.unit[c] = units(variance[c]);
+  if (settings.gate) addDeviations(variance, settings.radius, scale);
+  return scale;
+}
+
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rgb<float>& y,
+                       const JamesSteinSettings& settings) {
+  return jamesStein(x, variance, noiseScale(variance, settings), y, settings);
+}
+
+ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale& scale, const Rgb<float>& y,
                        const JamesSteinSettings& settings) {
   const int width = x.width(), height = x.height();
   ShrunkImage out{Rgb<float>(width, height), Rgb<float>(width, height)};
-  const std::vector<char> gate =
-      settings.gate ? gated(x, variance, y, settings.radius) : std::vector<char>(x.size(), char{0});
-  // Adds a channel in its units.
-  const auto add = [&](size_t c, double weight, Plane<double>& squares, Plane<double>& noise) {
-    const Plane<double> unit =
-        settings.filter == VarianceFilter::Whitened ? units(variance[c]) : Plane<double>(width, height, 1.0);
-    forAll(x.size(), [&](size_t i) {
-      if (gate[i]) return;
-      const auto value = static_cast<double>(x[c][i]), difference = value - static_cast<double>(y[c][i]);
-      squares[i] += weight * std::max(difference * difference, kRelativeLeast * value * value) / unit[i];
-      noise[i] += weight * static_cast<double>(variance[c][i]) / unit[i];
-    });
-  };
   const size_t together = settings.shared ? 3 : 1;
   for (size_t first = 0; first < 3; first += together) {
     Plane<double> squares(width, height), noise(width, height);
-    for (size_t c = first; c < first + together; ++c) add(c, 1.0 / static_cast<double>(together), squares, noise);
+    forAll(x.size(), [&](size_t i) {
+      if (gated(scale, x, y, i)) return;
+      for (size_t c = first; c < first + together; ++c) {
+        const double unit = scale.unit[c].empty() ? 1.0 : scale.unit[c][i];
+        const double weight = 1.0 / static_cast<double>(together);
+        const auto value = static_cast<double>(x[c][i]), difference = value - static_cast<double>(y[c][i]);
+        squares[i] += weight * std::max(difference * difference, kRelativeLeast * value * value) / unit;
+        noise[i] += weight * static_cast<double>(variance[c][i]) / unit;
+      }
+    });
     const Plane<double> factor = factors(squares, noise, settings);
-    for (size_t c = first; c < first + together; ++c)
-      forAll(x.size(), [&](size_t i) {
+    forAll(x.size(), [&](size_t i) {
+      const double rho = gated(scale, x, y, i) ? 0.0 : factor[i];
+      for (size_t c = first; c < first + together; ++c) {
         const auto other = static_cast<double>(y[c][i]);
-        const double rho = gate[i] ? 0.0 : factor[i];
         out.image[c][i] = finiteFloat(std::max(0.0, other + rho * (static_cast<double>(x[c][i]) - other)));
         out.factor[c][i] = finiteFloat(rho);
-      });
+      }
+    });
   }
   return out;
 }

@@ -11,6 +11,8 @@
 // 5.3).
 #pragma once
 
+#include <array>
+
 #include "renderer/core/plane.h"
 
 namespace braid {
@@ -41,6 +43,13 @@ struct JamesSteinSettings {
 // small do not matter, and 0 / 0 is 1, for X and Y agree.
 double shrinkageFactor(double numerator, double sumOfSquares, bool positivePart);
 
+// What of the noise does not depend on Y: worth keeping when one image is shrunk towards several.
+struct NoiseScale {
+  std::array<Plane<double>, 3> unit;  // what a squared difference is measured in; empty: 1
+  Plane<double> deviation, around;    // standard deviations of pixels and of their surroundings, for the gate; or empty
+};
+NoiseScale noiseScale(const Rgb<float>& variance, const JamesSteinSettings& settings);
+
 struct ShrunkImage {
   Rgb<float> image;
   Rgb<float> factor;  // mean factor of every pixel and channel: 1 is all X, 0 all Y
@@ -48,6 +57,9 @@ struct ShrunkImage {
 
 // x, y: images; variance: of the mean of x, >= 0. All of one size.
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rgb<float>& y,
+                       const JamesSteinSettings& settings);
+// The same with the scale of these settings and this variance.
+ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale& scale, const Rgb<float>& y,
                        const JamesSteinSettings& settings);
 
 }  // namespace braid

@@ -7,9 +7,9 @@
 namespace braid {
 
 // Whether a file of so many bytes can hold so many values. No format packs a flat picture tighter than one-bit pixels
-// under deflate, 8 x 1032 to the byte; twice that is allowed, and 2^24 values always are.
+// under deflate, 8 x 1032 to the byte; twice that is allowed, and 2^20 values always are.
 inline bool canHold(uint64_t fileBytes, uint64_t values) {
-  constexpr uint64_t kAlways = uint64_t(1) << 24, kMostPerByte = 16384;
+  constexpr uint64_t kAlways = uint64_t(1) << 20, kMostPerByte = 16384;
   return values <= kAlways || values / kMostPerByte <= fileBytes;
 }
 
