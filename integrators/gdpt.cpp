@@ -150,7 +150,8 @@ class GradientDomainPathTracer final : public Integrator {
       own = std::make_unique<BackgroundPixels>(request.context, request.plan);
       prepared = own.get();
     }
-    reconstruct(samples, prepared->background);
+    cancellable(request.cancel, [&] { reconstruct(samples, prepared->background); });
+    if (request.cancel && request.cancel->load()) return false;
     store(request, samples, target);
     return true;
   }

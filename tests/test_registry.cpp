@@ -306,6 +306,27 @@ TEST_CASE("A render ends soon after it is told to, and keeps the passes that are
   }
 }
 
+TEST_CASE("Progress goes forward, round by round") {
+  const Scene scene(cornellBox());
+  const Integrators all = makeIntegrators();
+  for (const auto& i : all) {
+    CAPTURE(std::string(i->name()));
+    Progress last;
+    uint64_t calls = 0;
+    Session(scene, makePlan(scene, cameraOf(scene), smallFrame(8, 8, 12, i->name()), pointersTo(all)))
+        .run([&](const Progress& p) {
+          CHECK(p.round == ++calls);
+          CHECK(p.rounds == 12);
+          CHECK(p.seconds >= last.seconds);
+          CHECK((p.secondsLeft >= 0 || p.secondsLeft == -1));
+          last = p;
+          return true;
+        });
+    CHECK(calls == 12);
+    CHECK(last.secondsLeft == doctest::Approx(0));
+  }
+}
+
 TEST_CASE("Leaving out what a scene does not need changes no pixel") {
   const Integrators all = makeIntegrators();
   for (const char* file : {"cornell", "materials"}) {

@@ -55,9 +55,12 @@ class Session::Loop {
         target_(makeTarget(session.plan_)),
         startSeconds_(session.film_.seconds) {
     result_.rounds = result_.firstRound = film_.rounds();
+    preparations_.resize(plan_.integrators.size());
     for (size_t i = 0; i < plan_.integrators.size(); ++i) {
       const Stopwatch preparing;
-      preparations_.push_back(plan_.integrators[i].integrator->prepare(session_.context_, plan_));
+      // When abandoned meanwhile, it is worth nothing, but then the first pass is dropped as well.
+      cancellable(abandon_,
+                  [&] { preparations_[i] = plan_.integrators[i].integrator->prepare(session_.context_, plan_); });
       film_.estimates[i].seconds += preparing.seconds();
     }
   }
