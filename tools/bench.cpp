@@ -216,15 +216,19 @@ std::vector<SceneSource> sourcesOf(const BenchOptions& o) {
   return sources;
 }
 
+std::pair<std::unique_ptr<Scene>, CameraData> openScene(const SceneSource& source, const BenchOptions& o) {
+  SceneChoice choice;
+  choice.isa = o.isa;
+  SceneData data = source.load();
+  const CameraData camera = chooseCamera(data, choice);
+  return {buildScene(std::move(data), choice), camera};
+}
+
 // Denoisers and combiners instead of rays.
 int runCombiningBench(const BenchOptions& o, const Settings& settings) {
   nlohmann::json all = nlohmann::json::array();
   for (const SceneSource& source : sourcesOf(o)) {
-    SceneChoice choice;
-    choice.isa = o.isa;
-    SceneData data = source.load();
-    const CameraData camera = chooseCamera(data, choice);
-    const std::unique_ptr<Scene> scene = buildScene(std::move(data), choice);
+    const auto [scene, camera] = openScene(source, o);
     const nlohmann::json methods = benchCombining(*scene, camera, settings, splitList(o.combine), o.repeats);
     all.push_back({{"scene", source.name}, {"methods", methods}});
     if (o.json) continue;
@@ -245,11 +249,7 @@ int runCombiningBench(const BenchOptions& o, const Settings& settings) {
 int runPublishingBench(const BenchOptions& o, const Settings& settings) {
   nlohmann::json all = nlohmann::json::array();
   for (const SceneSource& source : sourcesOf(o)) {
-    SceneChoice choice;
-    choice.isa = o.isa;
-    SceneData data = source.load();
-    const CameraData camera = chooseCamera(data, choice);
-    const std::unique_ptr<Scene> scene = buildScene(std::move(data), choice);
+    const auto [scene, camera] = openScene(source, o);
     nlohmann::json r = benchPublishing(*scene, camera, settings, o.publish, o.repeats);
     if (!o.json)
       fmt::print(
