@@ -118,7 +118,8 @@ Estimate consistentHalves(const Estimate& base) {
 }
 
 // x shrunk towards each base, and each half of x towards the base's half.
-std::vector<Estimate> shrunkTowards(const std::vector<Estimate>& bases, const Estimate& x, const Rgb<float>& variance) {
+std::vector<Estimate> shrunkTowards(const std::vector<Estimate>& bases, const Estimate& x, const Rgb<float>& variance,
+                                    const std::atomic<bool>* cancel) {
   JamesSteinSettings settings;
   settings.constant = 1;
   settings.gate = true;
@@ -128,7 +129,7 @@ std::vector<Estimate> shrunkTowards(const std::vector<Estimate>& bases, const Es
   for (size_t b = 0; b < bases.size(); ++b) out[b].name = "js@" + bases[b].name;
   const auto shrink = [&](const Rgb<float>& image, const Rgb<float>& noise, const auto& partOf) {
     const NoiseScale scale = noiseScale(noise, settings);
-    for (size_t b = 0; b < bases.size(); ++b)
+    for (size_t b = 0; b < bases.size() && !(cancel && cancel->load()); ++b)
       partOf(out[b]) = jamesStein(image, noise, scale, partOf(bases[b]), settings).image;
   };
   shrink(
@@ -192,13 +193,17 @@ MethodResult Auto::run(const MethodInputs& in) const {
     result.image = bases.empty() ? x : std::move(bases.back());
     return result;
   }
+  const auto cancelled = [&] { return in.cancel && in.cancel->load(); };
+  if (cancelled()) return result;
   const Rgb<float> variance = meanVariance(x);
   std::vector<Estimate> shrunk;
-  if (in.options.number(kShrink) != 0) shrunk = shrunkTowards(bases, x, variance);
+  if (in.options.number(kShrink) != 0) shrunk = shrunkTowards(bases, x, variance, in.cancel);
+  if (cancelled()) return result;
   std::vector<const Estimate*> candidates;
   for (const Estimate& e : shrunk) candidates.push_back(&e);
   for (const Estimate& e : bases) candidates.push_back(&e);
   const WeightMaps weights = weightsOf(candidates, x, variance, in);
+  if (cancelled()) return result;
   result.image = weightedEstimate(weights, candidates);
   if (in.options.number(kDespike) != 0) removeSpikes(result, x, variance, in.features);
   result.error = errorMap(result.image.half, x, variance, result.image.mean);
