@@ -64,6 +64,8 @@ TEST_CASE("every method states its memory to 10 %") {
         if (dynamic_cast<const OutsideMethod*>(method.get())) continue;
         const Needs needs = method->needs();
         if (c.pt().passes < needs.passes) continue;
+        // Between few and many passes only this one differs.
+        if (samples == 16 && std::string(method->name()) != "auto") continue;
         for (const auto& bases : baseSets)
           if (static_cast<int>(bases.size()) >= needs.bases && (needs.anyBases || needs.bases > 0 || bases.empty()))
             checkMemory(*method, c, bases);
