@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "combiners/plane_mean.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 #include "renderer/core/stopwatch.h"
@@ -23,16 +24,7 @@ void addDifference(Rgb<float>& to, const Rgb<float>& a, const Rgb<float>& b) {
     });
 }
 
-double meanOf(const Rgb<float>& image) {
-  double sum = 0;
-  for (size_t c = 0; c < 3; ++c)
-    sum += parallelSum(image[c].size(), kPixelChunk, 0.0, [&](size_t begin, size_t end) {
-      double part = 0;
-      for (size_t i = begin; i < end; ++i) part += static_cast<double>(image[c][i]);
-      return part;
-    });
-  return sum / static_cast<double>(3 * image.size());
-}
+double meanOf(const Rgb<float>& image) { return (planeMean(image[0]) + planeMean(image[1]) + planeMean(image[2])) / 3; }
 
 // The estimate with another mean; halves and quarters move with it.
 Estimate withMean(const Estimate& e, const Rgb<float>& mean) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "combiners/plane_mean.h"
 #include "renderer/core/hash.h"
 #include "renderer/core/parallel.h"
 
@@ -29,15 +30,6 @@ void forAllValues(const Rgb<float>& image, const Body& body) {
     parallelChunks(image.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) body(c, i);
     });
-}
-
-double meanOf(const Plane<float>& plane) {
-  const double sum = parallelSum<double>(plane.size(), kPixelChunk, 0, [&](size_t begin, size_t end) {
-    double part = 0;
-    for (size_t i = begin; i < end; ++i) part += static_cast<double>(plane[i]);
-    return part;
-  });
-  return plane.empty() ? 0 : sum / static_cast<double>(plane.size());
 }
 
 }  // namespace
@@ -105,7 +97,7 @@ Rgb<float> gaussianFiltered(const Rgb<float>& in, double sigma) {
 
 void applySignRule(Rgb<float>& filtered, const Rgb<float>& unfiltered, const Rgb<float>& variance) {
   for (size_t c = 0; c < 3; ++c) {
-    const bool helps = meanOf(variance[c]) > meanOf(unfiltered[c]);
+    const bool helps = planeMean(variance[c]) > planeMean(unfiltered[c]);
     parallelChunks(filtered[c].size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i)
         filtered[c][i] = helps ? std::max(0.0f, filtered[c][i]) : std::fabs(filtered[c][i]);

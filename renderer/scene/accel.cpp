@@ -84,7 +84,7 @@ Accel::~Accel() {
 
 void Accel::checkError(const char* doing) const {
   const RTCError error = rtcGetDeviceError(device_);
-  if (error == RTC_ERROR_NONE && device_) return;
+  if (error == RTC_ERROR_NONE) return;
   if (error == RTC_ERROR_OUT_OF_MEMORY)
     throw Error(ExitCode::OutOfMemory,
                 std::string("out of memory while ") + doing + ": reduce the scene or give the machine more memory");
@@ -121,7 +121,11 @@ void Accel::build(const AccelInput& input, const HitFilter* filter) {
   BRAID_ASSERT(device_ == nullptr);
   std::atomic<int64_t> bytes{0};
   device_ = rtcNewDevice(input.isa.empty() ? nullptr : ("isa=" + input.isa).c_str());
-  if (!device_) checkError("starting Embree");
+  if (!device_) {
+    if (rtcGetDeviceError(nullptr) == RTC_ERROR_OUT_OF_MEMORY)
+      throw Error(ExitCode::OutOfMemory, "out of memory while starting Embree: raise the limit of memory");
+    throw Error(ExitCode::Internal, "Embree cannot start: no supported instruction set");
+  }
   isa_ = input.isa.empty() ? "default" : input.isa;
   rtcSetDeviceMemoryMonitorFunction(device_, countMemory, &bytes);
   filter_ = filter;
