@@ -125,6 +125,7 @@ std::vector<Estimate> shrunkTowards(const std::vector<Estimate>& bases, const Es
   settings.gate = true;
   settings.shared = true;
   settings.filter = VarianceFilter::Whitened;
+  settings.keepFactors = false;
   std::vector<Estimate> out(bases.size());
   for (size_t b = 0; b < bases.size(); ++b) out[b].name = "js@" + bases[b].name;
   const auto shrink = [&](const Rgb<float>& image, const Rgb<float>& noise, const auto& partOf) {
@@ -158,6 +159,7 @@ WeightMaps weightsOf(const std::vector<const Estimate*>& candidates, const Estim
   EnsembleChoices choices;
   choices.patchRadius = static_cast<int>(std::clamp(in.options.number(kPatch), 1.0, 101.0)) / 2;
   choices.rootWeights = &root;
+  choices.stride = 2;
   choices.shared = true;
   const WeightMaps raw = ensembleWeights(x, candidates, choices);
   return filteredWeights(raw, weightedEstimate(raw, candidates), in.features);

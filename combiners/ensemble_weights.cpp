@@ -6,6 +6,7 @@
 #include "combiners/denoise/window.h"
 #include "combiners/finite_float.h"
 #include "combiners/simplex_solver.h"
+#include "renderer/core/error.h"
 
 namespace braid {
 
@@ -29,16 +30,24 @@ class TileWeights {
   void addChannels(size_t first, size_t last);
   void addPatchRow(size_t pair, const double* products, int y);
   void writeWeights(size_t c, WeightMaps& out);
+  void fillBlock(int column, int row, float weight, Plane<float>& out) const;
 
   const Estimate& x_;
   const std::vector<const Estimate*>& bases_;
   const EnsembleChoices& choices_;
   size_t pairs_;
-  PixelRect tile_, samples_;  // the pixels solved, and those in their patches
+  // Row `row` of the sums of a pair: those of the rows 0, stride, 2 stride, … of the tile.
+  double* sumsOfRow(size_t pair, int row) {
+    return sums_.data() +
+           (pair * static_cast<size_t>(rows_) + static_cast<size_t>(row)) * static_cast<size_t>(tile_.width());
+  }
+
+  PixelRect tile_, samples_;    // the pixels solved, and those in their patches
+  int rows_ = 0, columns_ = 0;  // of the blocks that share their weights
   // Of a row, three terms a channel, base and column: e^A, e^B, (y^A - y^B) / sqrt(2).
   std::vector<double> errors_;
   std::vector<double> products_, rowSums_;  // of one row and pair
-  std::vector<double> sums_;                // M by pair and pixel of the tile
+  std::vector<double> sums_;                // M by pair, row of blocks and column of pixels
 };
 
 void TileWeights::startSums(const PixelRect& tile) {
@@ -47,7 +56,9 @@ void TileWeights::startSums(const PixelRect& tile) {
   errors_.resize((choices_.shared ? 9 : 3) * bases_.size() * static_cast<size_t>(samples_.width()));
   products_.resize(static_cast<size_t>(samples_.width()));
   rowSums_.resize(static_cast<size_t>(tile.width()));
-  sums_.assign(pairs_ * static_cast<size_t>(tile.width() * tile.height()), 0.0);
+  rows_ = (tile.height() + choices_.stride - 1) / choices_.stride;
+  columns_ = (tile.width() + choices_.stride - 1) / choices_.stride;
+  sums_.assign(pairs_ * static_cast<size_t>(tile.width() * rows_), 0.0);
 }
 
 void TileWeights::errorsOfRow(size_t c, int y, double* out) {
@@ -78,9 +89,9 @@ void TileWeights::addPatchRow(size_t pair, const double* products, int y) {
     double* out = rowSums_.data() + (from - tile_.x0);
     for (int x = 0; x < to - from; ++x) out[x] += in[x];
   }
-  for (int row = std::max(tile_.y0, y - radius); row < std::min(tile_.y1, y + radius + 1); ++row) {
-    double* out = sums_.data() + (pair * static_cast<size_t>(tile_.height()) + static_cast<size_t>(row - tile_.y0)) *
-                                     static_cast<size_t>(width);
+  const int stride = choices_.stride, first = (std::max(tile_.y0, y - radius) - tile_.y0 + stride - 1) / stride;
+  for (int row = first; tile_.y0 + row * stride < std::min(tile_.y1, y + radius + 1); ++row) {
+    double* out = sumsOfRow(pair, row);
     for (int x = 0; x < width; ++x) out[x] += rowSums_[static_cast<size_t>(x)];
   }
 }
@@ -107,27 +118,32 @@ void TileWeights::addChannels(size_t first, size_t last) {
   }
 }
 
-// Solves for all pixels of the tile; the weights are those of channel c, or of all.
+// Solves for all blocks of the tile; the weights are those of channel c, or of all.
 void TileWeights::writeWeights(size_t c, WeightMaps& out) {
   SimplexSolver solver(bases_.size(), choices_.nonNegative);
-  const size_t count = static_cast<size_t>(tile_.width() * tile_.height());
-  for (size_t begin = 0; begin < count; begin += SimplexSolver::kLanes) {
-    const size_t lanes = std::min<size_t>(SimplexSolver::kLanes, count - begin);
+  const int blocks = rows_ * columns_, stride = choices_.stride;
+  for (int begin = 0; begin < blocks; begin += SimplexSolver::kLanes) {
+    const int lanes = std::min(SimplexSolver::kLanes, blocks - begin);
     size_t pair = 0;
     for (size_t i = 0; i < bases_.size(); ++i)
       for (size_t j = 0; j <= i; ++j, ++pair) {
         double* to = solver.entry(i, j);
         std::fill_n(to, SimplexSolver::kLanes, 0.0);
-        std::copy_n(sums_.data() + pair * count + begin, lanes, to);
+        for (int l = 0; l < lanes; ++l)
+          to[l] = sumsOfRow(pair, (begin + l) / columns_)[(begin + l) % columns_ * stride];
       }
     solver.solve();
     for (size_t b = 0; b < bases_.size(); ++b)
-      for (size_t l = 0; l < lanes; ++l) {
-        const auto at = static_cast<int>(begin + l);
-        out.of(b, c).at(tile_.x0 + at % tile_.width(), tile_.y0 + at / tile_.width()) =
-            static_cast<float>(solver.weight(b)[l]);
-      }
+      for (int l = 0; l < lanes; ++l)
+        fillBlock((begin + l) % columns_, (begin + l) / columns_, static_cast<float>(solver.weight(b)[l]),
+                  out.of(b, c));
   }
+}
+
+void TileWeights::fillBlock(int column, int row, float weight, Plane<float>& out) const {
+  const int x = tile_.x0 + column * choices_.stride, y = tile_.y0 + row * choices_.stride;
+  for (int v = y; v < std::min(y + choices_.stride, tile_.y1); ++v)
+    for (int u = x; u < std::min(x + choices_.stride, tile_.x1); ++u) out.at(u, v) = weight;
 }
 
 void TileWeights::solve(const PixelRect& tile, WeightMaps& out) {
@@ -149,6 +165,7 @@ WeightMaps uniformWeights(size_t bases, size_t channels, int width, int height) 
 
 WeightMaps ensembleWeights(const Estimate& unbiased, const std::vector<const Estimate*>& bases,
                            const EnsembleChoices& choices) {
+  BRAID_ASSERT(choices.stride >= 1 && kTileWidth % choices.stride == 0 && kTileHeight % choices.stride == 0);
   const int width = unbiased.mean.width(), height = unbiased.mean.height();
   WeightMaps out = uniformWeights(bases.size(), choices.shared ? 1 : 3, width, height);
   forEachTile(width, height, kTileWidth, kTileHeight,

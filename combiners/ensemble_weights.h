@@ -22,6 +22,9 @@ WeightMaps uniformWeights(size_t bases, size_t channels, int width, int height);
 
 struct EnsembleChoices {
   int patchRadius = 3;  // M is summed over patches of (2 radius + 1)² pixels; 0 as in the paper
+  // Blocks of stride² pixels share the weights of their first one: 1, 2, 4, …, 32. A patch is far larger than a block
+  // and moves slowly.
+  int stride = 1;
   bool nonNegative = true;
   bool shared = false;     // one weight for all channels, from the sum of their errors
   bool fullError = false;  // estimate the error of the mean of both halves instead of that of a half

@@ -7,14 +7,6 @@
 
 namespace braid {
 
-// i for 0 <= i < size; -i below, 2 size - 2 - i above, again and again for images smaller than the window.
-inline int mirrorIndex(int i, int size) {
-  if (size == 1) return 0;
-  const int period = 2 * (size - 1);
-  const int m = ((i % period) + period) % period;
-  return m < size ? m : period - m;
-}
-
 // The plane with `radius` mirrored pixels around it.
 template <class T>
 Plane<T> mirrorPadded(const Plane<T>& in, int radius) {
@@ -32,13 +24,7 @@ Plane<T> mirrorPadded(const Plane<T>& in, int radius) {
 // Means over windows of (2 radius + 1)² pixels.
 template <class T>
 Plane<double> mirrorBoxMean(const Plane<T>& in, int radius) {
-  const Plane<double> sums = boxSum(mirrorPadded(in, radius), radius);
-  Plane<double> out(in.width, in.height);
-  const double scale = 1.0 / ((2.0 * radius + 1) * (2.0 * radius + 1));
-  parallelRows(in.height, [&](int y) {
-    for (int x = 0; x < in.width; ++x) out.at(x, y) = sums.at(x + radius, y + radius) * scale;
-  });
-  return out;
+  return boxSum(in, radius, WindowBorder::Mirrored, 1.0 / ((2.0 * radius + 1) * (2.0 * radius + 1)));
 }
 
 }  // namespace braid

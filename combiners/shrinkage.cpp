@@ -68,14 +68,14 @@ Plane<double> numerators(const Plane<double>& variance, const JamesSteinSettings
   return out;
 }
 
-// What a difference is measured in, squared.
-Plane<double> units(const Plane<float>& variance) {
-  Plane<double> roots(variance.width, variance.height);
-  forAll(roots.size(), [&](size_t i) { roots[i] = std::sqrt(std::sqrt(static_cast<double>(variance[i]))); });
-  Plane<double> out = mirrorBoxMean(roots, 3);
+// One over what a squared difference is measured in.
+Plane<float> inverseUnits(const Plane<float>& variance) {
+  Plane<float> out(variance.width, variance.height);
+  forAll(out.size(), [&](size_t i) { out[i] = std::sqrt(std::sqrt(variance[i])); });
+  const Plane<double> roots = mirrorBoxMean(out, 3);
   forAll(out.size(), [&](size_t i) {
-    const double around = out[i] * out[i] * out[i] * out[i];
-    out[i] = std::max(0.5 * (static_cast<double>(variance[i]) + around), 1e-30);
+    const double around = roots[i] * roots[i] * roots[i] * roots[i];
+    out[i] = static_cast<float>(1 / std::max(0.5 * (static_cast<double>(variance[i]) + around), 1e-30));
   });
   return out;
 }
@@ -103,31 +103,63 @@ Plane<double> factors(const Plane<double>& squares, const Plane<double>& varianc
   return mirrorBoxMean(factor, s.radius);
 }
 
-// Standard deviations, over the channels, of pixels and of their surroundings. The latter is the square of the mean
-// root, so that a dozen outliers in a window do not hide each other.
-void addDeviations(const Rgb<float>& variance, int radius, NoiseScale& scale) {
-  scale.deviation = Plane<double>(variance.width(), variance.height());
-  Plane<double> roots(variance.width(), variance.height());
+// Where the standard deviation of a pixel, over the channels, is beyond 5 times that of its surroundings, one sample
+// carries it: X says nothing there that Y would contradict, unless they differ by 4 deviations or more. The deviation
+// around is the square of the mean root, so that a dozen outliers in a window do not hide each other.
+Plane<float> gates(const Rgb<float>& variance, int radius) {
+  Plane<float> deviation(variance.width(), variance.height()), roots(variance.width(), variance.height());
   forAll(roots.size(), [&](size_t i) {
     double v = 0;
     for (size_t c = 0; c < 3; ++c) v += static_cast<double>(variance[c][i]) / 3;
-    scale.deviation[i] = std::sqrt(v);
-    roots[i] = std::sqrt(scale.deviation[i]);
+    deviation[i] = static_cast<float>(std::sqrt(v));
+    roots[i] = std::sqrt(deviation[i]);
   });
-  scale.around = mirrorBoxMean(roots, radius);
-  forAll(roots.size(), [&](size_t i) { scale.around[i] *= scale.around[i]; });
+  const Plane<double> around = mirrorBoxMean(roots, radius);
+  forAll(roots.size(), [&](size_t i) {
+    const auto own = static_cast<double>(deviation[i]);
+    deviation[i] = own > 5 * around[i] * around[i] ? finiteFloat(sqr(4 * own)) : 0.0f;
+  });
+  return deviation;
 }
 
-// Whether the standard deviation of a pixel is beyond 5 times that of its surroundings although X and Y differ by less
-// than 4 of them: one sample carries it, and X says nothing that Y would contradict.
 bool gated(const NoiseScale& scale, const Rgb<float>& x, const Rgb<float>& y, size_t i) {
-  if (scale.deviation.empty() || !(scale.deviation[i] > 5 * scale.around[i])) return false;
+  if (scale.gate.empty() || scale.gate[i] <= 0) return false;
   double square = 0;
-  for (size_t c = 0; c < 3; ++c) {
-    const double d = static_cast<double>(x[c][i]) - static_cast<double>(y[c][i]);
-    square += d * d / 3;
+  for (size_t c = 0; c < 3; ++c) square += sqr(static_cast<double>(x[c][i]) - static_cast<double>(y[c][i])) / 3;
+  return square < static_cast<double>(scale.gate[i]);
+}
+
+// The squared differences of X and Y and the variance of X, in units of the scale: what the factors are made of.
+struct Terms {
+  Plane<double> squares, noise;
+};
+
+// Of the channels [first, first + together), averaged; nothing of gated pixels.
+Terms termsOf(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale& scale, const Rgb<float>& y,
+              size_t first, size_t together) {
+  Terms out{Plane<double>(x.width(), x.height()), Plane<double>(x.width(), x.height())};
+  const double weight = 1.0 / static_cast<double>(together);
+  forAll(x.size(), [&](size_t i) {
+    if (gated(scale, x, y, i)) return;
+    double squares = 0, noise = 0;
+    for (size_t c = first; c < first + together; ++c) {
+      const double inverse =
+          weight * (scale.inverseUnit[c].empty() ? 1.0 : static_cast<double>(scale.inverseUnit[c][i]));
+      const auto value = static_cast<double>(x[c][i]), difference = value - static_cast<double>(y[c][i]);
+      squares += inverse * std::max(difference * difference, kRelativeLeast * value * value);
+      noise += inverse * static_cast<double>(variance[c][i]);
+    }
+    out.squares[i] = squares;
+    out.noise[i] = noise;
+  });
+  return out;
+}
+
+void keepFactors(const Plane<double>& factor, size_t firstChannel, size_t lastChannel, Rgb<float>& out) {
+  for (size_t c = firstChannel; c < lastChannel; ++c) {
+    out[c] = Plane<float>(factor.width, factor.height);
+    forAll(factor.size(), [&](size_t i) { out[c][i] = finiteFloat(factor[i]); });
   }
-  return std::sqrt(square) < 4 * scale.deviation[i];
 }
 
 }  // namespace
@@ -141,8 +173,8 @@ double shrinkageFactor(double numerator, double sumOfSquares, bool positivePart)
 NoiseScale noiseScale(const Rgb<float>& variance, const JamesSteinSettings& settings) {
   NoiseScale scale;
   if (settings.filter == VarianceFilter::Whitened)
-    for (size_t c = 0; c < 3; ++c) scale.unit[c] = units(variance[c]);
-  if (settings.gate) addDeviations(variance, settings.radius, scale);
+    for (size_t c = 0; c < 3; ++c) scale.inverseUnit[c] = inverseUnits(variance[c]);
+  if (settings.gate) scale.gate = gates(variance, settings.radius);
   return scale;
 }
 
@@ -153,30 +185,20 @@ ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rg
 
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale& scale, const Rgb<float>& y,
                        const JamesSteinSettings& settings) {
-  const int width = x.width(), height = x.height();
-  ShrunkImage out{Rgb<float>(width, height), Rgb<float>(width, height)};
+  ShrunkImage out;
+  out.image = Rgb<float>(x.width(), x.height());
   const size_t together = settings.shared ? 3 : 1;
   for (size_t first = 0; first < 3; first += together) {
-    Plane<double> squares(width, height), noise(width, height);
+    const Terms terms = termsOf(x, variance, scale, y, first, together);
+    Plane<double> factor = factors(terms.squares, terms.noise, settings);
     forAll(x.size(), [&](size_t i) {
-      if (gated(scale, x, y, i)) return;
-      for (size_t c = first; c < first + together; ++c) {
-        const double unit = scale.unit[c].empty() ? 1.0 : scale.unit[c][i];
-        const double weight = 1.0 / static_cast<double>(together);
-        const auto value = static_cast<double>(x[c][i]), difference = value - static_cast<double>(y[c][i]);
-        squares[i] += weight * std::max(difference * difference, kRelativeLeast * value * value) / unit;
-        noise[i] += weight * static_cast<double>(variance[c][i]) / unit;
-      }
-    });
-    const Plane<double> factor = factors(squares, noise, settings);
-    forAll(x.size(), [&](size_t i) {
-      const double rho = gated(scale, x, y, i) ? 0.0 : factor[i];
+      if (gated(scale, x, y, i)) factor[i] = 0;
       for (size_t c = first; c < first + together; ++c) {
         const auto other = static_cast<double>(y[c][i]);
-        out.image[c][i] = finiteFloat(std::max(0.0, other + rho * (static_cast<double>(x[c][i]) - other)));
-        out.factor[c][i] = finiteFloat(rho);
+        out.image[c][i] = finiteFloat(std::max(0.0, other + factor[i] * (static_cast<double>(x[c][i]) - other)));
       }
     });
+    if (settings.keepFactors) keepFactors(factor, first, first + together, out.factor);
   }
   return out;
 }

@@ -37,6 +37,7 @@ struct JamesSteinSettings {
   bool global = false;       // one factor for the whole image, the original localisation: none
   bool shared = false;       // one factor for the three channels, from the means of their squares and variances
   bool gate = false;         // lone outliers are replaced by Y first (ALGORITHMS-BEYOND 8.3.3)
+  bool keepFactors = true;   // off: the result has none
 };
 
 // 1 - numerator / SSE, not below 0 on `positivePart`. SSE is not let below 10⁻⁵ (of images of order 1): numerators that
@@ -45,14 +46,14 @@ double shrinkageFactor(double numerator, double sumOfSquares, bool positivePart)
 
 // What of the noise does not depend on Y: worth keeping when one image is shrunk towards several.
 struct NoiseScale {
-  std::array<Plane<double>, 3> unit;  // what a squared difference is measured in; empty: 1
-  Plane<double> deviation, around;    // standard deviations of pixels and of their surroundings, for the gate; or empty
+  std::array<Plane<float>, 3> inverseUnit;  // one over what a squared difference is measured in; empty: 1
+  Plane<float> gate;  // of lone outliers: a mean squared difference below this is theirs, 0 elsewhere; or empty
 };
 NoiseScale noiseScale(const Rgb<float>& variance, const JamesSteinSettings& settings);
 
 struct ShrunkImage {
   Rgb<float> image;
-  Rgb<float> factor;  // mean factor of every pixel and channel: 1 is all X, 0 all Y
+  Rgb<float> factor;  // mean factor of every pixel and channel: 1 is all X, 0 all Y; or empty
 };
 
 // x, y: images; variance: of the mean of x, >= 0. All of one size.

@@ -317,6 +317,29 @@ TEST_CASE("Filtered weights stay on the simplex, halves average to the mean, and
     CHECK(std::fabs(e.mean[0][i] - 0.5f * (e.half[0][0][i] + e.half[1][0][i])) < 1e-5f * (1 + e.mean[0][i]));
 }
 
+TEST_CASE("Blocks share the weights of their first pixel") {
+  CaseOptions o;
+  o.width = 150;  // more than a tile, and no multiple of 4
+  o.height = 37;
+  const Case c = makeCase(o);
+  const MethodInputs in = inputsOf(c);
+  for (const bool shared : {false, true}) {
+    const WeightMaps all = ensembleWeights(*in.unbiased, in.bases, {.shared = shared});
+    for (const int stride : {2, 4}) {
+      const WeightMaps blocks = ensembleWeights(*in.unbiased, in.bases, {.stride = stride, .shared = shared});
+      // Problems are solved together and stop together, so that another company ends a little nearer to the minimum.
+      float worst = 0;
+      for (size_t m = 0; m < all.planes.size(); ++m)
+        for (int y = 0; y < o.height; ++y)
+          for (int x = 0; x < o.width; ++x)
+            worst = std::max(
+                worst, std::fabs(blocks.planes[m].at(x, y) - all.planes[m].at(x - x % stride, y - y % stride)));
+      CHECK(worst < 1e-3f);
+      CHECK(blocks.planes[0].at(stride, 0) != all.planes[0].at(stride + 1, 0));
+    }
+  }
+}
+
 TEST_CASE("The filter of weights is the formula at a pixel near a corner") {
   CaseOptions o;
   o.width = 12;

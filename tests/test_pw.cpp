@@ -48,8 +48,9 @@ class PlainFilter {
 
   Vec3 at(int x, int y) const {
     double total = 0, sum[3] = {0, 0, 0};
-    for (int v = std::max(0, y - 10); v <= std::min(input_.height() - 1, y + 10); ++v)
-      for (int u = std::max(0, x - 10); u <= std::min(input_.width() - 1, x + 10); ++u) {
+    for (int v = std::max(0, y - 9); v <= std::min(input_.height() - 1, y + 9); ++v)
+      for (int u = std::max(0, x - 9); u <= std::min(input_.width() - 1, x + 9); ++u) {
+        if (std::hypot(u - x, v - y) > 9) continue;
         const double w = weight(x, y, u, v);
         total += w;
         for (size_t c = 0; c < 3; ++c) sum[c] += w * radiance(u, v, c);

@@ -65,7 +65,7 @@ class PlainFit {
     double total = kappa, sum = kappa * zeroOrder;
     for (int v = 0; v < mean_.height(); v += options_.stride)
       for (int u = 0; u < mean_.width(); u += options_.stride) {
-        if (std::abs(u - x) > 10 || std::abs(v - y) > 10) continue;
+        if (std::hypot(u - x, v - y) > 9) continue;
         const double w = weight(u, v, x, y);
         total += w;
         sum += w * prediction(u, v, x, y, channel);
@@ -93,13 +93,13 @@ class PlainFit {
     return sqr(std::max(0.0, 1 - s / count / t2_)) * std::exp(-(sqr(x - u) + sqr(y - v)) / 50.0);
   }
 
-  // The fit around (cx, cy), at (x, y): [1, dx/10, dy/10] with a ridge on the slopes; the other columns vanish.
+  // The fit around (cx, cy), at (x, y): [1, dx/9, dy/9] with a ridge on the slopes; the other columns vanish.
   double prediction(int cx, int cy, int x, int y, size_t channel) const {
     double m[3][4] = {};
-    for (int v = cy - 10; v <= cy + 10; ++v)
-      for (int u = cx - 10; u <= cx + 10; ++u) {
-        if (!inside(u, v)) continue;
-        const double w = weight(cx, cy, u, v), row[3] = {1, (u - cx) / 10.0, (v - cy) / 10.0};
+    for (int v = cy - 9; v <= cy + 9; ++v)
+      for (int u = cx - 9; u <= cx + 9; ++u) {
+        if (!inside(u, v) || std::hypot(u - cx, v - cy) > 9) continue;
+        const double w = weight(cx, cy, u, v), row[3] = {1, (u - cx) / 9.0, (v - cy) / 9.0};
         for (int i = 0; i < 3; ++i) {
           for (int j = 0; j < 3; ++j) m[i][j] += w * row[i] * row[j];
           m[i][3] += w * row[i] * static_cast<double>(mean_[channel].at(u, v));
@@ -112,7 +112,7 @@ class PlainFit {
       for (int k = 0; k < 3; ++k)
         if (k != i)
           for (int j = 3; j >= i; --j) m[k][j] -= m[i][j] * m[k][i] / m[i][i];
-    return m[0][3] / m[0][0] + m[1][3] / m[1][1] * (x - cx) / 10 + m[2][3] / m[2][2] * (y - cy) / 10;
+    return m[0][3] / m[0][0] + m[1][3] / m[1][1] * (x - cx) / 9 + m[2][3] / m[2][2] * (y - cy) / 9;
   }
 
   const Rgb<float>&mean_, &variance_;

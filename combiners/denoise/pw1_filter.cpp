@@ -16,7 +16,7 @@ namespace {
 constexpr int kRadius = kPatchWelchWindow, kSide = 2 * kRadius + 1;
 // The window and one pixel around it are copied to contiguous memory, row by row: pixels at one offset from each other
 // are then at one distance, and loops run over the whole window at once. The last two columns of a "row" of kPitch
-// belong to the border and have weight zero.
+// belong to the border and have weight zero, as have the corners outside of the disc.
 constexpr int kPitch = kSide + 2, kBorderedSize = kPitch * kPitch;
 constexpr int kUnit = 16, kLanes = 8;
 constexpr int kCount = (kSide * kPitch + kUnit - 1) / kUnit * kUnit;
@@ -158,7 +158,7 @@ class TileRegression {
                                            (2 * kPatchWelchSpatialSd * kPatchWelchSpatialSd));
         columns_[1].v[i] = static_cast<float>(dx) / kRadius;
         columns_[2].v[i] = static_cast<float>(dy) / kRadius;
-        inWindow_.v[i] = 1;
+        inWindow_.v[i] = inPatchWelchWindow(dx, dy) ? 1.0f : 0.0f;
       }
     std::fill_n(columns_[0].v, kCount, 1.0f);
   }

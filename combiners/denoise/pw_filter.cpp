@@ -121,7 +121,8 @@ class TileFilter {
 
   void run() {
     for (int dy = 0; dy <= kPatchWelchWindow; ++dy)
-      for (int dx = dy == 0 ? 1 : -kPatchWelchWindow; dx <= kPatchWelchWindow; ++dx) visit(dx, dy);
+      for (int dx = dy == 0 ? 1 : -kPatchWelchWindow; dx <= kPatchWelchWindow; ++dx)
+        if (inPatchWelchWindow(dx, dy)) visit(dx, dy);
   }
 
   // The weighted means, with the albedo back in place.

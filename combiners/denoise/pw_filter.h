@@ -4,7 +4,7 @@
 //
 // It follows the statistical filter of Sakai et al. 2024 ("A Statistical Approach to Monte Carlo Denoising"), whose
 // per-pixel test on transformed samples is replaced by a soft test on patches of albedo-divided radiance with
-// regularised variance. For the pixels p and q = p + d of a window:
+// regularised variance. For the pixels p and q = p + d of a disc:
 //   z²(p) = mean over RGB of (u_p - u_q)² / (V_p + V_q),      s = mean of z² over 3 x 3 pairs at the same d,
 //   w     = max(0, 1 - s / t²)² exp(-|d|² / 50 - edge terms of albedo and normal),
 // clipped at the borders. Where both means have one expectation, E[s] is 1. t is the threshold z as a quantile of
@@ -23,7 +23,12 @@ namespace braid {
 
 inline constexpr double kPatchWelchThreshold = 1.6;      // of pw: for few samples
 inline constexpr double kPatchWelchWideThreshold = 2.2;  // of pw-wide and pw1: smoother
-inline constexpr int kPatchWelchWindow = 10;             // offsets in [-10, 10]²
+// A neighbour is at most so many pixels away. Such a disc holds 253 pixels. With the square of 21 x 21 that surrounds one
+// of 10, the filter takes 1.6 times as long for 0 to 2 % less error (14 scenes, 8 to 256 samples), auto for 0.2 % less.
+inline constexpr int kPatchWelchWindow = 9;
+constexpr bool inPatchWelchWindow(int dx, int dy) {
+  return dx * dx + dy * dy <= kPatchWelchWindow * kPatchWelchWindow;
+}
 // Of the spatial Gaussian, in pixels.
 inline constexpr double kPatchWelchSpatialSd = 5;
 // Keeps 0/0 away and nothing else, so that results scale with the light.
