@@ -6,6 +6,7 @@
 
 #include "combiners/denoise/window.h"
 #include "combiners/finite_float.h"
+#include "renderer/core/error.h"
 
 namespace braid {
 
@@ -69,12 +70,14 @@ void kernelOfRow(const Guides& guides, size_t p, size_t q, float spatial, int co
 }
 
 // Filters columns [x0, x0 + count) of row y. `sums` has room for all maps.
-void filterBlock(const WeightMaps& raw, const Guides& guides, int x0, int y, int count, float* sums, WeightMaps& out) {
+void filterBlock(const WeightMaps& raw, const Guides& guides, int step, int x0, int y, int count, float* sums,
+                 WeightMaps& out) {
   const Plane<float>& shape = raw.planes[0];
   float norm[kBlock] = {}, kernel[kBlock];
   std::fill_n(sums, raw.planes.size() * kBlock, 0.0f);
-  for (int dy = -std::min(kRadius, y); dy <= std::min(kRadius, shape.height - 1 - y); ++dy)
-    for (int dx = -kRadius; dx <= kRadius; ++dx) {
+  const int radius = kRadius / step * step;
+  for (int dy = -std::min(radius, y / step * step); dy <= std::min(radius, shape.height - 1 - y); dy += step)
+    for (int dx = -radius; dx <= radius; dx += step) {
       const int from = std::max(x0, -dx), to = std::min(x0 + count, shape.width - dx), n = to - from;
       if (n <= 0) continue;
       const size_t p = shape.index(from, y), q = shape.index(from + dx, y + dy);
@@ -94,7 +97,8 @@ void filterBlock(const WeightMaps& raw, const Guides& guides, int x0, int y, int
 
 }  // namespace
 
-WeightMaps filteredWeights(const WeightMaps& raw, const Estimate& guide, const Features* features) {
+WeightMaps filteredWeights(const WeightMaps& raw, const Estimate& guide, const Features* features, int step) {
+  BRAID_ASSERT(step >= 1 && step <= kRadius);
   const Plane<float> variance = guideVariance(guide);
   Guides guides{&guide.mean, &variance, nullptr, nullptr};
   if (features && !features->albedo.mean.empty()) guides.albedo = &features->albedo.mean;
@@ -104,7 +108,7 @@ WeightMaps filteredWeights(const WeightMaps& raw, const Estimate& guide, const F
   parallelRows(guide.mean.height(), [&](int y) {
     std::vector<float> sums(raw.planes.size() * kBlock);
     for (int x0 = 0; x0 < width; x0 += kBlock)
-      runVectorised([&] { filterBlock(raw, guides, x0, y, std::min(kBlock, width - x0), sums.data(), out); });
+      runVectorised([&] { filterBlock(raw, guides, step, x0, y, std::min(kBlock, width - x0), sums.data(), out); });
   });
   return out;
 }

@@ -12,6 +12,8 @@ namespace braid {
 //   D² = |z_p - z_q|² / (V_p + V_q + eps),   V = Σ_rgb (z^A - z^B)² / 2.
 // `guide` is the image z combined with the raw weights, and its halves. V is the variance of a half, as in the paper;
 // eps = 10⁻¹⁰ + 10⁻⁶ |z|². The features may be absent. Means of weights on the simplex stay on it.
-WeightMaps filteredWeights(const WeightMaps& raw, const Estimate& guide, const Features* features);
+// Of the neighbours only those at multiples of `step` pixels in x and y, at most 7: all that differ where blocks of as
+// many pixels share their weights.
+WeightMaps filteredWeights(const WeightMaps& raw, const Estimate& guide, const Features* features, int step = 1);
 
 }  // namespace braid

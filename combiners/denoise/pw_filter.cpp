@@ -113,16 +113,29 @@ class TileFilter {
         images_(input.images.size()) {
     const auto row = static_cast<size_t>(roundUp(tile.width() + kPatchWelchWindow + 2) + 2 * kRowUnit);
     for (std::vector<float>& b : inverse_) b.resize(row);
-    for (auto& image : patchRows_)
-      for (std::vector<float>& b : image) b.resize(row);
-    for (std::vector<float>* b : {&difference_, &inverseCount_, &weight_, &edge_}) b->resize(row);
+    for (Column& column : columns_) {
+      for (auto& image : column.patchRows)
+        for (std::vector<float>& b : image) b.resize(row);
+      column.inverseCount.resize(row);
+    }
+    for (std::vector<float>* b : {&difference_, &weight_, &edge_}) b->resize(row);
     startAtCentre();
   }
 
+  // Row by row for all dx of a dy, so that the rows that they share stay in the cache.
   void run() {
-    for (int dy = 0; dy <= kPatchWelchWindow; ++dy)
-      for (int dx = dy == 0 ? 1 : -kPatchWelchWindow; dx <= kPatchWelchWindow; ++dx)
-        if (inPatchWelchWindow(dx, dy)) visit(dx, dy);
+    for (int dy = 0; dy <= kPatchWelchWindow; ++dy) {
+      const int y0 = std::max(target_.y0 - dy, 0), y1 = std::min(target_.y1, height_ - dy);
+      if (y0 >= y1) continue;
+      for (int dx = -kPatchWelchWindow; dx <= kPatchWelchWindow; ++dx) begin(dx, dy);
+      for (int y = y0 - 1; y <= y1; ++y)
+        for (int dx = -kPatchWelchWindow; dx <= kPatchWelchWindow; ++dx) {
+          Column& column = columnOf(dx);
+          if (column.p.empty()) continue;
+          patchRow(column, y, dx, dy);
+          if (y > y0) accumulate(column, y - 1, dx, dy);
+        }
+    }
   }
 
   // The weighted means, with the albedo back in place.
@@ -161,30 +174,38 @@ class TileFilter {
     }
   }
 
-  // All pairs (p, p + d) with a pixel in the tile; dy >= 0.
-  void visit(int dx, int dy) {
+  // What is kept of an offset while the rows go by.
+  struct Column {
+    PixelRect p, pairs;  // the pixels p of pairs (p, p + d) with a pixel in the tile, and of those in the image
+    float spatial = 0;
+    std::array<std::array<std::vector<float>, 3>, PatchWelchInput::kMaxImages> patchRows;  // the last three
+    std::vector<float> inverseCount;
+    float* patchRow(size_t image, int y) { return patchRows[image][static_cast<size_t>(y + 3) % 3].data(); }
+  };
+  Column& columnOf(int dx) { return columns_[static_cast<size_t>(dx + kPatchWelchWindow)]; }
+
+  // dy >= 0; of d and -d one only.
+  void begin(int dx, int dy) {
+    Column& column = columnOf(dx);
+    column.p = {};
+    if (!inPatchWelchWindow(dx, dy) || (dy == 0 && dx <= 0)) return;
     const PixelRect reach = {target_.x0 - std::max(dx, 0), target_.y0 - dy, target_.x1 + std::max(-dx, 0), target_.y1};
-    const PixelRect pairs = pairsAt(dx, dy, width_, height_), p = intersection(reach, pairs);
-    if (p.empty()) return;
-    for (int x = p.x0; x < p.x1; ++x)
-      inverseCount_[static_cast<size_t>(x - p.x0)] =
-          1.0f / static_cast<float>(3 * patchCount(x, 1, pairs.x0, pairs.x1));
+    column.pairs = pairsAt(dx, dy, width_, height_);
+    column.p = intersection(reach, column.pairs);
+    for (int x = column.p.x0; x < column.p.x1; ++x)
+      column.inverseCount[static_cast<size_t>(x - column.p.x0)] =
+          1.0f / static_cast<float>(3 * patchCount(x, 1, column.pairs.x0, column.pairs.x1));
     const double distance2 = dx * dx + dy * dy;
-    const auto spatial = static_cast<float>(-static_cast<double>(kLog2E) * distance2 /
-                                            (2 * kPatchWelchSpatialSd * kPatchWelchSpatialSd));
-    for (int y = p.y0 - 1; y <= p.y1; ++y) {
-      patchRow(p, pairs, y, dx, dy);
-      if (y > p.y0) accumulate(p, pairs, y - 1, dx, dy, spatial);
-    }
+    column.spatial = static_cast<float>(-static_cast<double>(kLog2E) * distance2 /
+                                        (2 * kPatchWelchSpatialSd * kPatchWelchSpatialSd));
   }
 
-  float* patchRowOf(size_t image, int y) { return patchRows_[image][static_cast<size_t>(y + 3) % 3].data(); }
-
   // Row y of z², summed over three neighbours in x, of every image; zeros outside the image.
-  void patchRow(const PixelRect& p, const PixelRect& pairs, int y, int dx, int dy) {
+  void patchRow(Column& column, int y, int dx, int dy) {
+    const PixelRect &p = column.p, &pairs = column.pairs;
     const int count = roundUp(p.width());
     if (y < pairs.y0 || y >= pairs.y1) {
-      for (size_t i = 0; i < images_; ++i) std::fill_n(patchRowOf(i, y), count, 0.0f);
+      for (size_t i = 0; i < images_; ++i) std::fill_n(column.patchRow(i, y), count, 0.0f);
       return;
     }
     const int x0 = std::max(p.x0 - 1, pairs.x0), x1 = std::min(p.x1 + 1, pairs.x1), padded = roundUp(x1 - x0);
@@ -197,23 +218,24 @@ class TileFilter {
       differenceRow(rowsAt(tile_.radiance[i], at), rowsAt(tile_.radiance[i], to),
                     {inverse_[0].data(), inverse_[1].data(), inverse_[2].data()}, padded, z2);
       std::fill(z2 + (x1 - x0), z2 + padded + 2, 0.0f);
-      boxRow(difference_.data(), count, patchRowOf(i, y));
+      boxRow(difference_.data(), count, column.patchRow(i, y));
     }
   }
 
   // Adds the pairs of row y to the sums of both pixels.
-  void accumulate(const PixelRect& p, const PixelRect& pairs, int y, int dx, int dy, float spatial) {
+  void accumulate(Column& column, int y, int dx, int dy) {
+    const PixelRect &p = column.p, &pairs = column.pairs;
     const int count = roundUp(p.width());
     const float inverseRows = 1.0f / static_cast<float>(patchCount(y, 1, pairs.y0, pairs.y1));
     bool edgeReady = false;
     for (size_t i = 0; i < images_; ++i)
       for (size_t k = 0; k < thresholds_.size(); ++k) {
         const float scale = inverseRows / (thresholds_[k] * PatchWelchInput::varianceFactor(i));
-        if (!toleranceRow({patchRowOf(i, y - 1), patchRowOf(i, y), patchRowOf(i, y + 1)}, inverseCount_.data(), scale,
-                          count, weight_.data()))
+        if (!toleranceRow({column.patchRow(i, y - 1), column.patchRow(i, y), column.patchRow(i, y + 1)},
+                          column.inverseCount.data(), scale, count, weight_.data()))
           continue;
         if (!edgeReady)
-          edgeRow(tile_, tile_.index(p.x0, y), tile_.index(p.x0 + dx, y + dy), spatial, count, edge_.data());
+          edgeRow(tile_, tile_.index(p.x0, y), tile_.index(p.x0 + dx, y + dy), column.spatial, count, edge_.data());
         edgeReady = true;
         weightRow(weight_.data(), edge_.data(), count);
         addToBoth(p, y, dx, dy, tile_.radiance[i], sums_[k * images_ + i]);
@@ -238,8 +260,8 @@ class TileFilter {
   size_t images_;
   std::vector<Sums> sums_;  // [threshold][image]
   std::array<std::vector<float>, 3> inverse_;
-  std::array<std::array<std::vector<float>, 3>, PatchWelchInput::kMaxImages> patchRows_;  // the last three rows
-  std::vector<float> difference_, inverseCount_, weight_, edge_;
+  std::array<Column, 2 * kPatchWelchWindow + 1> columns_;  // by dx
+  std::vector<float> difference_, weight_, edge_;
 };
 
 }  // namespace

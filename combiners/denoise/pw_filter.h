@@ -41,7 +41,7 @@ double studentQuantile(double z, uint64_t dof);
 float squaredThreshold(double z, uint64_t passes);
 
 struct TileSize {
-  int width = 128, height = 32;
+  int width = 256, height = 32;
 };
 
 // Filters each image of `input` with its own weights, for each threshold, in one pass over the distances: result[k][i]

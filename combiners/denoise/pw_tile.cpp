@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "combiners/denoise/pw_tile.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "combiners/denoise/variance.h"
 #include "renderer/core/error.h"
@@ -14,17 +16,33 @@ constexpr float kMinAlbedo = 0.03f;
 constexpr float kAlbedoSd = 0.25f, kNormalSd = 0.25f;
 const float kAlbedoScale = std::sqrt(0.5f * kLog2E) / kAlbedoSd, kNormalScale = std::sqrt(0.5f * kLog2E) / kNormalSd;
 
-float finiteOrZero(float v) { return std::isfinite(v) ? v : 0.0f; }
+inline float finiteOrZero(float v) { return std::fabs(v) <= std::numeric_limits<float>::max() ? v : 0.0f; }
 
-Vec3 finiteOrZero(const Vec3& v) { return Vec3(finiteOrZero(v.x), finiteOrZero(v.y), finiteOrZero(v.z)); }
+// out = factor times what is finite of the row, in [low, high].
+void copyRow(const float* __restrict in, int count, float factor, float low, float high, float* __restrict out) {
+  for (int x = 0; x < count; ++x) out[x] = factor * std::min(std::max(finiteOrZero(in[x]), low), high);
+}
 
 // What radiance is divided by. The albedo of a miss is the radiance of the environment, that of an emitter contains its
 // emission.
-Vec3 divisorOf(const Features& features, size_t i) {
-  const Plane<float>& depth = features.depth.mean;
-  if (features.albedo.mean.empty() || (!depth.empty() && depth[i] == 0)) return Vec3(1);
-  const Vec3 albedo = finiteOrZero(features.albedo.mean.pixel(i));
-  return maxComponent(albedo) > 1 ? Vec3(1) : glm::max(albedo, Vec3(kMinAlbedo));
+void divisorRow(const float* __restrict r, const float* __restrict g, const float* __restrict b,
+                const float* __restrict depth, int count, float* __restrict dr, float* __restrict dg,
+                float* __restrict db) {
+  for (int x = 0; x < count; ++x) {
+    const float ar = finiteOrZero(r[x]), ag = finiteOrZero(g[x]), ab = finiteOrZero(b[x]);
+    const bool surface = std::max(std::max(ar, ag), ab) <= 1 && (!depth || depth[x] != 0);
+    dr[x] = surface ? std::max(ar, kMinAlbedo) : 1.0f;
+    dg[x] = surface ? std::max(ag, kMinAlbedo) : 1.0f;
+    db[x] = surface ? std::max(ab, kMinAlbedo) : 1.0f;
+  }
+}
+
+void divideRow(const float* __restrict in, const float* __restrict divisor, int count, float* __restrict out) {
+  for (int x = 0; x < count; ++x) out[x] = finiteOrZero(in[x]) / divisor[x];
+}
+
+void divideBySquareRow(const float* __restrict in, const float* __restrict divisor, int count, float* __restrict out) {
+  for (int x = 0; x < count; ++x) out[x] = in[x] / (divisor[x] * divisor[x]);
 }
 
 float inverseMeanDepth(const Features& features) {
@@ -64,30 +82,33 @@ PatchWelchTile::PatchWelchTile(const PatchWelchInput& input, const PixelRect& pi
   for (std::vector<float>& plane : guide) plane.assign(size, 0.0f);
   depth.assign(size, 0.0f);
   visibility.assign(size, 0.0f);
-  for (int y = rect.y0; y < rect.y1; ++y)
-    for (int x = rect.x0; x < rect.x1; ++x) {
-      const size_t i = input.variance[0].index(x, y);
-      const auto at = static_cast<size_t>(index(x, y));
-      const Vec3 a = input.features ? divisorOf(*input.features, i) : Vec3(1);
-      if (input.features) storeFeatures(input, i, at);
-      for (int c = 0; c < 3; ++c) {
-        const auto channel = static_cast<size_t>(c);
-        divisor[channel][at] = a[c];
-        variance[channel][at] = input.variance[channel][i] / (a[c] * a[c]);
-        for (size_t k = 0; k < radiance.size(); ++k)
-          radiance[k][channel][at] = finiteOrZero((*input.images[k])[channel][i]) / a[c];
-      }
+  const int count = rect.width();
+  for (int y = rect.y0; y < rect.y1; ++y) {
+    const size_t from = input.variance[0].index(rect.x0, y);
+    const auto at = static_cast<size_t>(index(rect.x0, y));
+    if (input.features) storeFeatures(*input.features, input.depthScale, from, at);
+    for (size_t c = 0; c < 3; ++c) {
+      divideBySquareRow(&input.variance[c][from], &divisor[c][at], count, &variance[c][at]);
+      for (size_t k = 0; k < radiance.size(); ++k)
+        divideRow(&(*input.images[k])[c][from], &divisor[c][at], count, &radiance[k][c][at]);
     }
+  }
 }
 
-void PatchWelchTile::storeFeatures(const PatchWelchInput& input, size_t i, size_t at) {
-  const Features& f = *input.features;
-  for (size_t c = 0; c < 3; ++c) {
-    if (!f.albedo.mean.empty()) guide[c][at] = kAlbedoScale * std::clamp(finiteOrZero(f.albedo.mean[c][i]), 0.0f, 1.0f);
-    if (!f.normal.mean.empty()) guide[3 + c][at] = kNormalScale * finiteOrZero(f.normal.mean[c][i]);
+void PatchWelchTile::storeFeatures(const Features& f, float depthScale, size_t from, size_t at) {
+  constexpr float kMost = std::numeric_limits<float>::max();
+  const int count = rect.width();
+  const float* z = f.depth.mean.empty() ? nullptr : &f.depth.mean[from];
+  if (!f.albedo.mean.empty()) {
+    const Rgb<float>& albedo = f.albedo.mean;
+    divisorRow(&albedo[0][from], &albedo[1][from], &albedo[2][from], z, count, &divisor[0][at], &divisor[1][at],
+               &divisor[2][at]);
+    for (size_t c = 0; c < 3; ++c) copyRow(&albedo[c][from], count, kAlbedoScale, 0, 1, &guide[c][at]);
   }
-  if (!f.depth.mean.empty()) depth[at] = input.depthScale * finiteOrZero(f.depth.mean[i]);
-  if (!f.visibility.mean.empty()) visibility[at] = finiteOrZero(f.visibility.mean[i]);
+  for (size_t c = 0; c < 3 && !f.normal.mean.empty(); ++c)
+    copyRow(&f.normal.mean[c][from], count, kNormalScale, -kMost, kMost, &guide[3 + c][at]);
+  if (z) copyRow(z, count, depthScale, -kMost, kMost, &depth[at]);
+  if (!f.visibility.mean.empty()) copyRow(&f.visibility.mean[from], count, 1, -kMost, kMost, &visibility[at]);
 }
 
 }  // namespace braid

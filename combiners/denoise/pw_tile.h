@@ -55,7 +55,7 @@ struct PatchWelchTile {
   ptrdiff_t index(int x, int y) const { return static_cast<ptrdiff_t>(y - rect.y0) * pitch + (x - rect.x0); }
 
  private:
-  void storeFeatures(const PatchWelchInput& input, size_t i, size_t at);
+  void storeFeatures(const Features& features, float depthScale, size_t from, size_t at);  // of a row
 };
 
 }  // namespace braid
