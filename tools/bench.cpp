@@ -245,7 +245,7 @@ int runCombiningBench(const BenchOptions& o, const Settings& settings) {
   return 0;
 }
 
-// What is published while a render goes on, and at its end, against the passes alone.
+// What is published while a render goes on and combined at its end, against the passes and a plain file.
 int runPublishingBench(const BenchOptions& o, const Settings& settings) {
   nlohmann::json all = nlohmann::json::array();
   for (const SceneSource& source : sourcesOf(o)) {
@@ -253,11 +253,12 @@ int runPublishingBench(const BenchOptions& o, const Settings& settings) {
     nlohmann::json r = benchPublishing(*scene, camera, settings, o.publish, o.repeats);
     if (!o.json)
       fmt::print(
-          "{}: {}x{}, {} spp: {:.2f} s, with {:.1f} publications ({:.1f} combined) {:.2f} s: {:+.1f} %; of "
-          "processor time {:+.1f} %\n",
+          "{}: {}x{}, {} spp: {:.2f} s, with {:.1f} publications ({:.1f} combined) {:.2f} s: {:+.1f} %, "
+          "the last combining {:.1f} %; of processor time {:+.1f} %\n",
           source.name, settings.width, settings.height, settings.spp, r["seconds"].get<double>(),
           r["publications"].get<double>(), r["combinedPublications"].get<double>(), r["publishedSeconds"].get<double>(),
-          100 * r["overhead"].get<double>(), 100 * r["processorOverhead"].get<double>());
+          100 * r["overhead"].get<double>(), 100 * r["lastCombineSeconds"].get<double>() / r["seconds"].get<double>(),
+          100 * r["processorOverhead"].get<double>());
     r["scene"] = source.name;
     all.push_back(std::move(r));
   }

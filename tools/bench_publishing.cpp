@@ -66,9 +66,16 @@ nlohmann::json benchPublishing(const Scene& scene, const CameraData& camera, con
   requireRunnable(planCombining(options.image.combine, settings.spp, plan), options.image.combine.wanted());
   std::vector<Cost> alone, published;
   int publications = 0, combined = 0;
+  WrittenImage last;
   for (int k = 0; k < repeats; ++k) {
-    Session plain(scene, plan);
-    alone.push_back(costOf([&] { plain.advance(); }));
+    alone.push_back(costOf([&] {
+      Session session(scene, plan);
+      session.advance();
+      ImageOutput plain = options.image;
+      plain.combine.combine = "none";
+      const std::optional<Plane<float>> alpha = session.alpha();
+      writeImage(plain, describedEstimates(session, true), alpha ? &*alpha : nullptr, settings.threads);
+    }));
     published.push_back(costOf([&] {
       Session session(scene, plan);
       Publisher publisher(options, session);
@@ -79,7 +86,7 @@ nlohmann::json benchPublishing(const Scene& scene, const CameraData& camera, con
         }
         return true;
       });
-      publisher.finish();
+      last = publisher.finish();
     }));
   }
   const Cost a = median(alone), p = median(published);
@@ -88,6 +95,8 @@ nlohmann::json benchPublishing(const Scene& scene, const CameraData& camera, con
           {"seconds", a.seconds},
           {"publishedSeconds", p.seconds},
           {"overhead", p.seconds / a.seconds - 1},
+          {"lastCombineSeconds", last.combineSeconds},
+          {"lastWriteSeconds", last.writeSeconds},
           {"processorSeconds", a.processor},
           {"publishedProcessorSeconds", p.processor},
           {"processorOverhead", p.processor / a.processor - 1},

@@ -20,11 +20,12 @@ PublicationSchedule::Due PublicationSchedule::due(const Progress& p) const {
   const auto since = [&](double last) { return saveEvery_ > 0 && p.seconds - last >= saveEvery_; };
   const bool mark = !soonOver && (std::has_single_bit(p.round) || (checkSamples_ > 0 && p.round >= checkSamples_));
   const bool plainPays = !any_ || plainSpent_ + plainCost_ <= kShare * p.seconds;
-  const bool combinedPays =
-      combines_ && any_ && combinedSpent_ <= kShare * p.seconds && combinedSpent_ + combinedCost_ <= shareOfRun(p, 0);
+  const bool combinedPays = combines_ && any_ && combinedSpent_ <= kShare * p.seconds &&
+                            combinedSpent_ + withLast(combinedCost_) <= shareOfRun(p, 0);
   due.state = (mark && plainPays) || since(lastState_);
   due.combined = (mark || since(lastImage_)) && combinedPays;
   due.image = due.combined || (!combinedOut_ && ((mark && plainPays) || since(lastImage_)));
+  due.layers = due.image && (layersOut_ || since(0));
   return due;
 }
 
@@ -32,6 +33,7 @@ void PublicationSchedule::begun(const Due& what, const Progress& p) {
   if (what.state) lastState_ = p.seconds;
   if (!what.image) return;
   lastImage_ = p.seconds;
+  layersOut_ = layersOut_ || what.layers;
   any_ = true;
   checkSamples_ = 0;
 }
@@ -48,7 +50,7 @@ void PublicationSchedule::published(uint64_t samples, bool combined, double cost
 }
 
 bool PublicationSchedule::tooLong(const Progress& p, double cost) const {
-  return combinedSpent_ + cost > shareOfRun(p, kLeastRun);
+  return combinedSpent_ + withLast(cost) > shareOfRun(p, kLeastRun);
 }
 
 // It would have taken longer: by how much nobody knows.

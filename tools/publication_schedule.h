@@ -2,8 +2,11 @@
 // When a running render shows what it has: after the rounds 1, 2, 4, 8, …, every so many seconds, and where the error
 // is expected to meet its target; but never so often that showing takes more than its share of the time.
 //
-// With combiners the first image out is the plain one, because nobody knows yet what combining costs. Combined ones
-// replace it as soon as they are affordable, and one that turns out to be too long is given up.
+// Rounds 1, 2, 4, 8, … are worth a look: the image without the layers beside it, which take twenty times as long to
+// write. From when the clock first asks for an image, every file holds all.
+//
+// With combiners the first image out is the plain one. Combined ones replace it as soon as they are affordable, the
+// last one of the run included, and one that turns out to be too long is given up.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +19,7 @@ namespace braid {
 class PublicationSchedule {
  public:
   // Of the time of a run, what combining may take, and as much what plain images and states after rounds 1, 2, 4, …
-  // may take; what the clock asks for and the final images apart.
+  // may take; what the clock asks for apart.
   static constexpr double kShare = 0.04;
   // A run that ends so soon, in seconds, has its final images soon: only the clock asks for more.
   static constexpr double kSoon = 1;
@@ -25,13 +28,15 @@ class PublicationSchedule {
   // Before so many samples a pixel an error estimate does not end a render: what is rare may not have been met yet.
   static constexpr uint64_t kLeastSamples = 16;
 
-  // `saveEvery` in seconds, 0: never by the clock; `targetError` 0: none; `combines`: whether combiners run.
-  PublicationSchedule(double saveEvery, double targetError, bool combines)
-      : saveEvery_(saveEvery), targetError_(targetError), combines_(combines) {}
+  // `saveEvery` in seconds, 0: never by the clock; `targetError` 0: none; `combines`: whether combiners run, at what
+  // they are expected to cost until that is known.
+  PublicationSchedule(double saveEvery, double targetError, bool combines, double expectedCost = 0)
+      : saveEvery_(saveEvery), targetError_(targetError), combines_(combines), combinedCost_(expectedCost) {}
 
   struct Due {
     bool state = false, image = false;
     bool combined = false;  // the image goes through the combiners
+    bool layers = false;    // it is written with all layers
   };
   // What to do after this round.
   Due due(const Progress& progress) const;
@@ -50,14 +55,16 @@ class PublicationSchedule {
 
  private:
   double shareOfRun(const Progress& progress, double least) const;
+  // With the last image of the run, unless it ends with the one that this cost is for.
+  double withLast(double cost) const { return targetError_ > 0 ? cost : 2 * cost; }
 
   double saveEvery_, targetError_;
   bool combines_;
   double lastImage_ = 0, lastState_ = 0;  // when
   // Apart, so that frequent saving does not keep combiners from their share.
   double plainSpent_ = 0, combinedSpent_ = 0;
-  double plainCost_ = 0, combinedCost_ = 0;  // of one
-  bool any_ = false, combinedOut_ = false, reached_ = false;
+  double plainCost_ = 0, combinedCost_;  // of one
+  bool any_ = false, layersOut_ = false, combinedOut_ = false, reached_ = false;
   uint64_t checkSamples_ = 0;  // when the error is worth a look; 0: not before the next power of two
 };
 

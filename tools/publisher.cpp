@@ -16,6 +16,21 @@ namespace braid {
 
 namespace {
 
+// What combining is expected to cost before anybody has tried, in seconds of one core a pixel: "auto" takes 3e-6.
+constexpr double kExpectedSeconds = 3e-6;
+
+int threadsOf(const PublishOptions& options) { return options.threads > 0 ? options.threads : machineThreads(); }
+
+double expectedCost(const Session& session, int threads) {
+  const Rgb<double>& pixels = session.state().estimates.front().sums.sums().front();
+  return kExpectedSeconds * static_cast<double>(pixels.size()) / threads;
+}
+
+ImageOutput withoutLayers(ImageOutput output) {
+  output.aovs = "none";
+  return output;
+}
+
 ImageOutput withoutCombining(ImageOutput output) {
   output.combine.combine = "none";
   output.combine.denoisers.clear();
@@ -55,8 +70,8 @@ Publisher::Publisher(PublishOptions options, const Session& session)
     : options_(std::move(options)),
       combines_(!options_.image.combine.wanted().empty() || !options_.image.combine.denoisers.empty()),
       session_(session),
-      schedule_(options_.saveEvery, options_.targetError, combines_) {
-  const int threads = options_.threads > 0 ? options_.threads : machineThreads();
+      schedule_(options_.saveEvery, options_.targetError, combines_, expectedCost(session, threadsOf(options_))) {
+  const int threads = threadsOf(options_);
   helpers_ = std::max(1, threads / 4);
   machineShare_ = static_cast<double>(helpers_) / threads;
 }
@@ -117,11 +132,12 @@ void Publisher::saveState(const Progress& p, std::vector<Publication>& news) {
   schedule_.spend(clock.seconds());
 }
 
-void Publisher::publishImage(const Progress& p, bool combined) {
+void Publisher::publishImage(const Progress& p, bool combined, bool layers) {
   const Stopwatch clock;
   cancel_ = false;
   pending_ = {samplesOf(session_.state()), p.seconds, combined, {}, {}};
   const auto output = std::make_shared<ImageOutput>(combined ? options_.image : withoutCombining(options_.image));
+  if (!layers) *output = withoutLayers(*output);
   auto shown = std::make_shared<Estimates>(describedEstimates(session_, !options_.image.noTiming));
   const auto alpha = std::make_shared<std::optional<Plane<float>>>(session_.alpha());
   heldUp_ = clock.seconds();
@@ -151,7 +167,7 @@ std::vector<Publication> Publisher::round(const Progress& p) {
   due.image = due.image && hasImage() && imageJob_.idle();
   due.state = due.state && !options_.checkpoint.empty() && stateJob_.idle();
   if (due.state) saveState(p, news);
-  if (due.image) publishImage(p, due.combined);
+  if (due.image) publishImage(p, due.combined, due.layers);
   schedule_.begun(due, p);
   return news;
 }

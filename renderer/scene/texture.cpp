@@ -131,6 +131,23 @@ std::string formatName(const uint8_t* data, size_t bytes) {
 
 using InputPointer = std::unique_ptr<OIIO::ImageInput>;
 
+// OpenImageIO's reader copies from beyond the end of the memory when a file sends it there.
+class BoundedReader : public OIIO::Filesystem::IOMemReader {
+ public:
+  using IOMemReader::IOMemReader;
+  size_t read(void* to, size_t size) override {
+    const size_t count = pread(to, size, m_pos);
+    m_pos += static_cast<int64_t>(count);
+    return count;
+  }
+  size_t pread(void* to, size_t size, int64_t offset) override {
+    if (offset < 0 || static_cast<uint64_t>(offset) >= m_buf.size()) return 0;
+    const size_t at = static_cast<size_t>(offset), count = std::min(size, m_buf.size() - at);
+    std::memcpy(to, m_buf.data() + at, count);
+    return count;
+  }
+};
+
 InputPointer openInput(const std::string& name, OIIO::Filesystem::IOProxy* proxy) {
   OIIO::ImageSpec config;
   // Alpha is coverage in glTF: colours must not be multiplied by it.
@@ -260,7 +277,7 @@ size_t Texture::bytes() const { return image_ ? image_->bytes.size() + image_->f
 std::shared_ptr<const Image> decodeImage(const uint8_t* data, size_t bytes, const std::string& name) {
   if (bytes == 0) throw Error(ExitCode::BadInput, "is an empty image; save it again");
   const std::string format = formatName(data, bytes);
-  OIIO::Filesystem::IOMemReader reader(data, bytes);
+  BoundedReader reader(data, bytes);
   const InputPointer input = openInput(format, &reader);
   return readPixels(*input, name, bytes);
 }
