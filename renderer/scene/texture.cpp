@@ -135,14 +135,14 @@ using InputPointer = std::unique_ptr<OIIO::ImageInput>;
 class BoundedReader : public OIIO::Filesystem::IOMemReader {
  public:
   using IOMemReader::IOMemReader;
-  size_t read(void* to, size_t size) override {
-    const size_t count = pread(to, size, m_pos);
+  size_t read(void* to, size_t most) override {
+    const size_t count = pread(to, most, m_pos);
     m_pos += static_cast<int64_t>(count);
     return count;
   }
-  size_t pread(void* to, size_t size, int64_t offset) override {
-    if (offset < 0 || static_cast<uint64_t>(offset) >= m_buf.size()) return 0;
-    const size_t at = static_cast<size_t>(offset), count = std::min(size, m_buf.size() - at);
+  size_t pread(void* to, size_t most, int64_t offset) override {
+    if (offset < 0 || static_cast<uint64_t>(offset) >= size()) return 0;
+    const size_t at = static_cast<size_t>(offset), count = std::min(most, size() - at);
     std::memcpy(to, m_buf.data() + at, count);
     return count;
   }
