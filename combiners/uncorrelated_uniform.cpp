@@ -21,7 +21,7 @@ class UncorrelatedUniform : public Method {
     needs.variance = false;
     return needs;
   }
-  MethodMemory memory(const MemoryCase& /*of*/) const override { return {57, 40}; }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {50, 40}; }
 
   MethodResult run(const MethodInputs& in) const override {
     const Estimate &y = *in.unbiased, &z = *in.correlated;

@@ -30,7 +30,7 @@ Progress at(uint64_t round, double seconds, double left = -1) {
 }  // namespace
 
 TEST_CASE("Images are due after rounds 1, 2, 4, 8, and by the clock") {
-  PublicationSchedule s(10, 0, false);
+  PublicationSchedule s(10, 0, false, {});
   std::vector<uint64_t> marks;
   for (uint64_t round = 1; round <= 40; ++round) {
     const Progress p = at(round, static_cast<double>(round) * 0.1);
@@ -38,35 +38,30 @@ TEST_CASE("Images are due after rounds 1, 2, 4, 8, and by the clock") {
     CHECK(due.image == due.state);
     CHECK(!due.combined);
     s.begun(due, p);
-    CHECK(!due.layers);
     if (due.image) s.published(round, false, 1e-5, std::nullopt);
     if (due.image) marks.push_back(round);
   }
   CHECK(marks == std::vector<uint64_t>{1, 2, 4, 8, 16, 32});
   CHECK(!s.due(at(41, 13.1)).image);
-  const auto byClock = s.due(at(41, 13.3));  // ten seconds after round 32
-  CHECK(byClock.image);
-  CHECK(byClock.layers);
-  s.begun(byClock, at(41, 13.3));
-  CHECK(s.due(at(64, 13.4)).layers);  // a file never loses its layers again
-  CHECK(!PublicationSchedule(0, 0, false).due(at(41, 1e6)).image);
+  CHECK(s.due(at(41, 13.3)).image);  // ten seconds after round 32
+  CHECK(!PublicationSchedule(0, 0, false, {}).due(at(41, 1e6)).image);
   // Nothing for runs that are about to end.
-  CHECK(!PublicationSchedule(10, 0, false).due(at(1, 0.1, 0.5)).image);
-  CHECK(PublicationSchedule(10, 0, false).due(at(1, 0.1, 5)).image);
+  CHECK(!PublicationSchedule(10, 0, false, {}).due(at(1, 0.1, 0.5)).image);
+  CHECK(PublicationSchedule(10, 0, false, {}).due(at(1, 0.1, 5)).image);
   Progress last = at(64, 50, 0);
   last.rounds = 64;
-  CHECK(!PublicationSchedule(10, 0, false).due(last).state);
+  CHECK(!PublicationSchedule(10, 0, false, {}).due(last).state);
 }
 
 TEST_CASE("Publishing takes its share of the time and no more") {
   // Every image costs one second of the machine; a round takes 0.2 s; the clock is off.
   for (const bool combines : {false, true}) {
-    PublicationSchedule s(0, 0, combines);
+    PublicationSchedule s(0, 0, combines, {});
     uint64_t round = 0;
     double seconds = 0, spent = 0;
     int images = 0, combined = 0;
     const double last = combines ? 1 : 0;  // the final image, which comes out of the same share
-    while (seconds < 5000) {
+    while (seconds < 20000) {
       seconds += 0.2;
       const Progress p = at(++round, seconds);
       const auto due = s.due(p);
@@ -77,7 +72,8 @@ TEST_CASE("Publishing takes its share of the time and no more") {
       ++images;
       combined += due.combined;
       // What the first one of a kind costs is not known before.
-      if (images > 2) CHECK(spent - (combines ? 1 : 0) + last <= PublicationSchedule::kShare * seconds);
+      const double share = combines ? PublicationSchedule::kShare : PublicationSchedule::kPlainShare;
+      if (images > 2) CHECK(spent - (combines ? 1 : 0) + last <= share * seconds);
     }
     CHECK(images >= 8);
     CHECK(combined == (combines ? images - 1 : 0));
@@ -85,7 +81,7 @@ TEST_CASE("Publishing takes its share of the time and no more") {
 }
 
 TEST_CASE("The first image is plain, combined ones follow, and one that takes too long is given up") {
-  PublicationSchedule s(5, 0, true);
+  PublicationSchedule s(5, 0, true, {});
   const auto first = s.due(at(1, 1, 999));
   CHECK(first.image);
   CHECK(!first.combined);
@@ -100,7 +96,7 @@ TEST_CASE("The first image is plain, combined ones follow, and one that takes to
   CHECK(!s.due(at(4, 60, 940)).combined);
   CHECK(s.due(at(4, 60, 940)).image);  // plain, by the clock
   // Once a combined image is out, no plain one takes its place.
-  PublicationSchedule t(5, 0, true);
+  PublicationSchedule t(5, 0, true, {});
   t.begun({.state = true, .image = true}, at(1, 1));
   t.published(1, false, 0.01, std::nullopt);
   t.begun({.state = true, .image = true, .combined = true}, at(2, 100));
@@ -112,15 +108,21 @@ TEST_CASE("The first image is plain, combined ones follow, and one that takes to
   // What it is expected to cost counts until it is known, and a target of the error ends the run with the combined
   // image.
   for (const double target : {0.0, 0.01}) {
-    PublicationSchedule v(0, target, true, 1.5);
+    PublicationSchedule v(0, target, true, {0, 1.5});
     v.begun({.state = true, .image = true}, at(1, 1));
     v.published(1, false, 0.01, std::nullopt);
     CHECK(!v.due(at(2, 2, 35)).combined);
     CHECK(v.due(at(2, 2, 48)).combined == (target > 0));
     CHECK(v.due(at(2, 2, 98)).combined);
   }
+  // A first image that is dear waits for the clock in a short run.
+  const PublicationSchedule dear(60, 0, true, {0.7, 0});
+  CHECK(!dear.due(at(1, 1, 40)).image);
+  CHECK(dear.due(at(1, 1, 49)).image);
+  CHECK(dear.due(at(1, 1)).image);  // a run without an end
+  CHECK(dear.due(at(30, 61, 2)).image);
   // Saving by the clock, however dear, does not keep combiners from their share.
-  PublicationSchedule u(1, 0, true);
+  PublicationSchedule u(1, 0, true, {});
   u.begun({.state = true, .image = true}, at(1, 1));
   u.published(1, false, 50, std::nullopt);
   u.spend(100);
@@ -128,7 +130,7 @@ TEST_CASE("The first image is plain, combined ones follow, and one that takes to
 }
 
 TEST_CASE("A target of the error is looked at where it should be met, not before 16 samples") {
-  PublicationSchedule s(0, 0.01, false);
+  PublicationSchedule s(0, 0.01, false, {});
   s.begun({.state = true, .image = true}, at(8, 1));
   s.published(8, false, 0, 0.0);
   CHECK(!s.reached());

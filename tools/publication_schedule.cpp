@@ -7,10 +7,9 @@
 
 namespace braid {
 
-// Of a run with a limit all of it, otherwise of what there was so far.
-double PublicationSchedule::shareOfRun(const Progress& p, double least) const {
-  const double run = p.secondsLeft >= 0 ? p.seconds + p.secondsLeft : std::max(least, p.seconds);
-  return kShare * run;
+// With a limit all of it, otherwise what there was so far.
+double PublicationSchedule::lengthOfRun(const Progress& p, double least) {
+  return p.secondsLeft >= 0 ? p.seconds + p.secondsLeft : std::max(least, p.seconds);
 }
 
 PublicationSchedule::Due PublicationSchedule::due(const Progress& p) const {
@@ -19,13 +18,13 @@ PublicationSchedule::Due PublicationSchedule::due(const Progress& p) const {
   const bool soonOver = p.secondsLeft >= 0 && p.secondsLeft < kSoon;
   const auto since = [&](double last) { return saveEvery_ > 0 && p.seconds - last >= saveEvery_; };
   const bool mark = !soonOver && (std::has_single_bit(p.round) || (checkSamples_ > 0 && p.round >= checkSamples_));
-  const bool plainPays = !any_ || plainSpent_ + plainCost_ <= kShare * p.seconds;
+  const double plainRun = any_ ? p.seconds : lengthOfRun(p, kLeastRun);
+  const bool plainPays = plainSpent_ + cost_.plain <= kPlainShare * plainRun;
   const bool combinedPays = combines_ && any_ && combinedSpent_ <= kShare * p.seconds &&
-                            combinedSpent_ + withLast(combinedCost_) <= shareOfRun(p, 0);
+                            combinedSpent_ + withLast(cost_.combined) <= kShare * lengthOfRun(p, 0);
   due.state = (mark && plainPays) || since(lastState_);
   due.combined = (mark || since(lastImage_)) && combinedPays;
   due.image = due.combined || (!combinedOut_ && ((mark && plainPays) || since(lastImage_)));
-  due.layers = due.image && (layersOut_ || since(0));
   return due;
 }
 
@@ -33,7 +32,6 @@ void PublicationSchedule::begun(const Due& what, const Progress& p) {
   if (what.state) lastState_ = p.seconds;
   if (!what.image) return;
   lastImage_ = p.seconds;
-  layersOut_ = layersOut_ || what.layers;
   any_ = true;
   checkSamples_ = 0;
 }
@@ -41,7 +39,7 @@ void PublicationSchedule::begun(const Due& what, const Progress& p) {
 // The squared error of a mean falls as one over the number of samples.
 void PublicationSchedule::published(uint64_t samples, bool combined, double cost, std::optional<double> error) {
   (combined ? combinedSpent_ : plainSpent_) += cost;
-  (combined ? combinedCost_ : plainCost_) = cost;
+  (combined ? cost_.combined : cost_.plain) = cost;
   combinedOut_ = combinedOut_ || combined;
   if (targetError_ <= 0 || !error || samples < kLeastSamples) return;
   reached_ = reached_ || *error <= targetError_;
@@ -50,13 +48,13 @@ void PublicationSchedule::published(uint64_t samples, bool combined, double cost
 }
 
 bool PublicationSchedule::tooLong(const Progress& p, double cost) const {
-  return combinedSpent_ + withLast(cost) > shareOfRun(p, kLeastRun);
+  return combinedSpent_ + withLast(cost) > kShare * lengthOfRun(p, kLeastRun);
 }
 
 // It would have taken longer: by how much nobody knows.
 void PublicationSchedule::givenUp(double cost) {
   combinedSpent_ += cost;
-  combinedCost_ = 2 * cost;
+  cost_.combined = 2 * cost;
 }
 
 }  // namespace braid

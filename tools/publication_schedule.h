@@ -2,9 +2,6 @@
 // When a running render shows what it has: after the rounds 1, 2, 4, 8, …, every so many seconds, and where the error
 // is expected to meet its target; but never so often that showing takes more than its share of the time.
 //
-// Rounds 1, 2, 4, 8, … are worth a look: the image without the layers beside it, which take twenty times as long to
-// write. From when the clock first asks for an image, every file holds all.
-//
 // With combiners the first image out is the plain one. Combined ones replace it as soon as they are affordable, the
 // last one of the run included, and one that turns out to be too long is given up.
 #pragma once
@@ -18,25 +15,28 @@ namespace braid {
 
 class PublicationSchedule {
  public:
-  // Of the time of a run, what combining may take, and as much what plain images and states after rounds 1, 2, 4, …
-  // may take; what the clock asks for apart.
-  static constexpr double kShare = 0.04;
+  // Of the time of a run, what combining may take, and what plain images and states after rounds 1, 2, 4, … may take;
+  // what the clock asks for apart.
+  static constexpr double kShare = 0.04, kPlainShare = 0.015;
   // A run that ends so soon, in seconds, has its final images soon: only the clock asks for more.
   static constexpr double kSoon = 1;
-  // Runs without a limit count as at least so long when a combiner may take its share, in seconds.
+  // Runs without a limit count as at least so long for the first plain image and for giving up a combiner, in seconds.
   static constexpr double kLeastRun = 50;
   // Before so many samples a pixel an error estimate does not end a render: what is rare may not have been met yet.
   static constexpr uint64_t kLeastSamples = 16;
 
-  // `saveEvery` in seconds, 0: never by the clock; `targetError` 0: none; `combines`: whether combiners run, at what
-  // they are expected to cost until that is known.
-  PublicationSchedule(double saveEvery, double targetError, bool combines, double expectedCost = 0)
-      : saveEvery_(saveEvery), targetError_(targetError), combines_(combines), combinedCost_(expectedCost) {}
+  // What an image is expected to cost until that is known, in seconds of the whole machine.
+  struct Costs {
+    double plain = 0, combined = 0;
+  };
+
+  // `saveEvery` in seconds, 0: never by the clock; `targetError` 0: none; `combines`: whether combiners run.
+  PublicationSchedule(double saveEvery, double targetError, bool combines, const Costs& expected)
+      : saveEvery_(saveEvery), targetError_(targetError), combines_(combines), cost_(expected) {}
 
   struct Due {
     bool state = false, image = false;
     bool combined = false;  // the image goes through the combiners
-    bool layers = false;    // it is written with all layers
   };
   // What to do after this round.
   Due due(const Progress& progress) const;
@@ -54,7 +54,7 @@ class PublicationSchedule {
   bool reached() const { return reached_; }
 
  private:
-  double shareOfRun(const Progress& progress, double least) const;
+  static double lengthOfRun(const Progress& progress, double least);
   // With the last image of the run, unless it ends with the one that this cost is for.
   double withLast(double cost) const { return targetError_ > 0 ? cost : 2 * cost; }
 
@@ -63,8 +63,8 @@ class PublicationSchedule {
   double lastImage_ = 0, lastState_ = 0;  // when
   // Apart, so that frequent saving does not keep combiners from their share.
   double plainSpent_ = 0, combinedSpent_ = 0;
-  double plainCost_ = 0, combinedCost_;  // of one
-  bool any_ = false, layersOut_ = false, combinedOut_ = false, reached_ = false;
+  Costs cost_;
+  bool any_ = false, combinedOut_ = false, reached_ = false;
   uint64_t checkSamples_ = 0;  // when the error is worth a look; 0: not before the next power of two
 };
 

@@ -79,7 +79,7 @@ class Publisher {
   void collect(std::vector<Publication>& news);
   void fail(std::vector<Publication>& news, const std::exception_ptr& failure, const Publication& of);
   void saveState(const Progress& progress, std::vector<Publication>& news);
-  void publishImage(const Progress& progress, bool combined, bool layers);
+  void publishImage(const Progress& progress, bool combined);
   void giveUpIfTooLong(const Progress& progress);
   WrittenImage writeNow(const ImageOutput& output);
   bool hasImage() const { return options_.image.show || !options_.image.files().empty(); }
