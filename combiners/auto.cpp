@@ -162,6 +162,7 @@ WeightMaps weightsOf(const std::vector<const Estimate*>& candidates, const Estim
   choices.patchRadius = static_cast<int>(std::clamp(in.options.number(kPatch), 1.0, 101.0)) / 2;
   choices.rootWeights = &root;
   choices.stride = kWeightStride;
+  choices.improvement = 1e-5;
   choices.shared = true;
   const WeightMaps raw = ensembleWeights(x, candidates, choices);
   return filteredWeights(raw, weightedEstimate(raw, candidates), in.features, kWeightStride);

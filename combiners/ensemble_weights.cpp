@@ -120,7 +120,7 @@ void TileWeights::addChannels(size_t first, size_t last) {
 
 // Solves for all blocks of the tile; the weights are those of channel c, or of all.
 void TileWeights::writeWeights(size_t c, WeightMaps& out) {
-  SimplexSolver solver(bases_.size(), choices_.nonNegative);
+  SimplexSolver solver(bases_.size(), choices_.nonNegative, choices_.improvement);
   const int blocks = rows_ * columns_, stride = choices_.stride;
   for (int begin = 0; begin < blocks; begin += SimplexSolver::kLanes) {
     const int lanes = std::min(SimplexSolver::kLanes, blocks - begin);

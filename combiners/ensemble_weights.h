@@ -26,8 +26,9 @@ struct EnsembleChoices {
   // and moves slowly.
   int stride = 1;
   bool nonNegative = true;
-  bool shared = false;     // one weight for all channels, from the sum of their errors
-  bool fullError = false;  // estimate the error of the mean of both halves instead of that of a half
+  bool shared = false;        // one weight for all channels, from the sum of their errors
+  bool fullError = false;     // estimate the error of the mean of both halves instead of that of a half
+  double improvement = 1e-9;  // see SimplexSolver
   // Square roots of the weights of pixels in the sums over patches; null: all 1.
   const Plane<float>* rootWeights = nullptr;
 };

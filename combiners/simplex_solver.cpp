@@ -10,15 +10,19 @@ namespace braid {
 
 namespace {
 
-constexpr size_t kMostSteps = 1024;    // as in the paper
-constexpr double kFlat = 1e-12;        // of the scale: a curvature below it decides nothing
-constexpr double kImprovement = 1e-9;  // of the scale, in a cycle: less than that ends the search
-constexpr double kMostWeight = 8;      // of weights that may be negative
+constexpr size_t kMostSteps = 1024;  // as in the paper
+constexpr double kFlat = 1e-12;      // of the scale: a curvature below it decides nothing
+constexpr double kMostWeight = 8;    // of weights that may be negative
 
 }  // namespace
 
-SimplexSolver::SimplexSolver(size_t n, bool nonNegative)
-    : n_(n), nonNegative_(nonNegative), matrix_(n * n * kLanes), weights_(n * kLanes), products_(n * kLanes) {}
+SimplexSolver::SimplexSolver(size_t n, bool nonNegative, double improvement)
+    : n_(n),
+      nonNegative_(nonNegative),
+      improvement_(improvement),
+      matrix_(n * n * kLanes),
+      weights_(n * kLanes),
+      products_(n * kLanes) {}
 
 // The upper triangle, and the scale.
 void SimplexSolver::completeMatrix() {
@@ -72,7 +76,7 @@ void SimplexSolver::searchLine(size_t i) {
 
 bool SimplexSolver::converged() const {
   bool done = true;
-  for (int l = 0; l < kLanes; ++l) done = done && before_[l] - value_[l] <= kImprovement * scale_[l];
+  for (int l = 0; l < kLanes; ++l) done = done && before_[l] - value_[l] <= improvement_ * scale_[l];
   return done;
 }
 

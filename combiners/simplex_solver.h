@@ -17,8 +17,9 @@ class SimplexSolver {
  public:
   static constexpr int kLanes = 16;  // problems at a time
 
-  // For matrices of size n x n, n >= 1. Without nonNegative, weights are only kept within [-8, 8].
-  SimplexSolver(size_t n, bool nonNegative);
+  // For matrices of size n x n, n >= 1. Without nonNegative, weights are only kept within [-8, 8]. The search ends
+  // where a cycle through all vertices gains no more than `improvement` of the largest diagonal entry.
+  SimplexSolver(size_t n, bool nonNegative, double improvement = 1e-9);
 
   // Entry (i, j), j <= i, of the matrices of all lanes, to be set before solve(): finite, in any unit. A matrix that is
   // not positive semidefinite leads to a local minimum.
@@ -37,6 +38,7 @@ class SimplexSolver {
 
   size_t n_;
   bool nonNegative_;
+  double improvement_;
   std::vector<double> matrix_, weights_, products_;  // M, w and Mw, lanes innermost
   double value_[kLanes] = {}, before_[kLanes] = {};  // wᵀMw now and a cycle ago
   double scale_[kLanes] = {};                        // the largest diagonal entry
