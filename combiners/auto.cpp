@@ -4,26 +4,22 @@
 //   1. x: the unbiased image, fused with photon maps by their estimated errors (fused_estimate.h);
 //   2. bases: patch-Welch filters of x, and the denoisers that the user asked for;
 //   3. candidates: every base, and x shrunk towards it (shrinkage.h);
-//   4. an ensemble of the candidates, with errors measured across halves (ensemble_weights.h);
+//   4. an ensemble of the candidates, with errors measured across halves (relative_weights.h);
 //   5. outliers that one or two quarters alone speak for are replaced (despike.h);
 //   6. the error map (error_map.h), plus the squared bias that the photon maps admit.
 // x itself is no candidate: halves cannot see the error of an outlier in the half that holds it.
 #include <algorithm>
 #include <array>
-#include <cmath>
 
-#include "combiners/channel_mean.h"
-#include "combiners/box_mean.h"
 #include "combiners/denoise/pw1_filter.h"
 #include "combiners/denoise/pw_filter.h"
 #include "combiners/despike.h"
-#include "combiners/ensemble_weights.h"
 #include "combiners/error_map.h"
 #include "combiners/fused_estimate.h"
 #include "combiners/recipe.h"
+#include "combiners/relative_weights.h"
 #include "combiners/registry.h"
 #include "combiners/shrinkage.h"
-#include "combiners/weight_filter.h"
 
 namespace braid {
 
@@ -36,11 +32,6 @@ const OptionInfo kDespike{"auto-despike", 1, "0: keep outliers"};
 
 constexpr uint64_t kFewestPasses = 4;       // fewer: the first filter alone
 constexpr uint64_t kFirstOrderPasses = 64;  // fewer: slopes fit noise
-// How much of a pixel's variance counts as its scale in sums of relative errors: without any, single outliers decide;
-// with all of it, filters that keep outliers go unpunished.
-constexpr double kVarianceShare = 0.3;
-// Weights are solved for blocks of so many pixels in x and y. For every pixel, the error is lower by 0.1 to 0.3 %.
-constexpr int kWeightStride = 2;
 
 class Auto : public Method {
  public:
@@ -143,31 +134,6 @@ std::vector<Estimate> shrunkTowards(const std::vector<Estimate>& bases, const Es
   return out;
 }
 
-// Roots of the weights that make errors of pixels relative.
-Plane<float> rootWeights(const Rgb<float>& guide, const Rgb<float>& variance) {
-  const Plane<double> level =
-      boxMean(channelMean(guide, [&](size_t i, size_t c) { return static_cast<double>(guide[c][i]); }), 1);
-  const Plane<float> noise =
-      channelMean(variance, [&](size_t i, size_t c) { return static_cast<double>(variance[c][i]); });
-  Plane<float> out(guide.width(), guide.height());
-  for (size_t i = 0; i < out.size(); ++i)
-    out[i] = finiteFloat(1 / std::sqrt(level[i] * level[i] + 0.01 + kVarianceShare * static_cast<double>(noise[i])));
-  return out;
-}
-
-WeightMaps weightsOf(const std::vector<const Estimate*>& candidates, const Estimate& x, const Rgb<float>& variance,
-                     const MethodInputs& in) {
-  const Plane<float> root = rootWeights(candidates.back()->mean, variance);
-  EnsembleChoices choices;
-  choices.patchRadius = static_cast<int>(std::clamp(in.options.number(kPatch), 1.0, 101.0)) / 2;
-  choices.rootWeights = &root;
-  choices.stride = kWeightStride;
-  choices.improvement = 1e-5;
-  choices.shared = true;
-  const WeightMaps raw = ensembleWeights(x, candidates, choices);
-  return filteredWeights(raw, weightedEstimate(raw, candidates), in.features, kWeightStride);
-}
-
 Attribute countRemark(const char* name, size_t count) {
   Attribute a;
   a.name = name;
@@ -207,7 +173,8 @@ MethodResult Auto::run(const MethodInputs& in) const {
   std::vector<const Estimate*> candidates;
   for (const Estimate& e : shrunk) candidates.push_back(&e);
   for (const Estimate& e : bases) candidates.push_back(&e);
-  const WeightMaps weights = weightsOf(candidates, x, variance, in);
+  const int patchRadius = static_cast<int>(std::clamp(in.options.number(kPatch), 1.0, 101.0)) / 2;
+  const WeightMaps weights = relativeWeights(x, candidates, variance, in.features, patchRadius);
   if (cancelled()) return result;
   result.image = weightedEstimate(weights, candidates);
   if (in.options.number(kDespike) != 0) removeSpikes(result, x, variance, in.features);

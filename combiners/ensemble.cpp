@@ -5,10 +5,10 @@
 // combiners/weight_filter.h); the halves of the result are the halves of the bases with the same weights.
 #include <algorithm>
 
-#include "combiners/ensemble_weights.h"
 #include "combiners/error_map.h"
 #include "combiners/recipe.h"
 #include "combiners/registry.h"
+#include "combiners/relative_weights.h"
 #include "combiners/weight_filter.h"
 
 namespace braid {
@@ -21,6 +21,10 @@ const OptionInfo kFilter{"ensemble-filter", 1, "1: smooth the weights by a cross
 const OptionInfo kShared{"ensemble-shared", 0, "1: the same weights for all channels; 0: weights per channel"};
 const OptionInfo kNonNegative{"ensemble-non-negative", 1, "0: weights may be negative, which makes fireflies"};
 const OptionInfo kFullError{"ensemble-full-error", 0, "1: errors of the whole images in place of those of the halves"};
+
+const OptionInfo kRelative{
+    "ensemble-relative", 1,
+    "1: errors relative to the brightness of the first base, as relL2 counts them; 0: the paper's"};
 
 // Fewer passes leave too few in each half to tell the bases apart.
 constexpr uint64_t kFewestPasses = 8;
@@ -41,7 +45,9 @@ class Ensemble : public Method {
     const bool quarters = of.passes == 0 || of.passes >= 4;
     return {90 + (quarters ? 12 : 5) * of.bases, 40 + 4 * of.bases};
   }
-  std::vector<OptionInfo> options() const override { return {kPatch, kFilter, kShared, kNonNegative, kFullError}; }
+  std::vector<OptionInfo> options() const override {
+    return {kPatch, kFilter, kShared, kNonNegative, kFullError, kRelative};
+  }
   MethodResult run(const MethodInputs& in) const override;
 };
 
@@ -63,7 +69,12 @@ Attribute remark(const char* name, const std::string& text) {
 
 MethodResult Ensemble::run(const MethodInputs& in) const {
   MethodResult result;
-  const EnsembleChoices choices = choicesOf(in.options);
+  EnsembleChoices choices = choicesOf(in.options);
+  Plane<float> roots;
+  if (in.options.number(kRelative) != 0) {
+    roots = relativeErrorRoots(in.bases.front()->mean, meanVariance(*in.unbiased));
+    choices.rootWeights = &roots;
+  }
   const uint64_t passes = in.unbiased->passes;
   WeightMaps weights;
   if (passes > 0 && passes < kFewestPasses) {

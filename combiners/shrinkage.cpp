@@ -104,8 +104,9 @@ Plane<double> factors(const Plane<double>& squares, const Plane<double>& varianc
 }
 
 // Where the standard deviation of a pixel, over the channels, is beyond 5 times that of its surroundings, one sample
-// carries it: X says nothing there that Y would contradict, unless they differ by 4 deviations or more. The deviation
-// around is the square of the mean root, so that a dozen outliers in a window do not hide each other.
+// carries it: X says nothing there that Y would contradict, unless they differ by 3 deviations or more (k samples of
+// many make sqrt(k)). The deviation around is the square of the mean root, so that a dozen outliers in a window do not
+// hide each other.
 Plane<float> gates(const Rgb<float>& variance, int radius) {
   Plane<float> deviation(variance.width(), variance.height()), roots(variance.width(), variance.height());
   forAll(roots.size(), [&](size_t i) {
@@ -117,7 +118,7 @@ Plane<float> gates(const Rgb<float>& variance, int radius) {
   const Plane<double> around = mirrorBoxMean(roots, radius);
   forAll(roots.size(), [&](size_t i) {
     const auto own = static_cast<double>(deviation[i]);
-    deviation[i] = own > 5 * around[i] * around[i] ? finiteFloat(sqr(4 * own)) : 0.0f;
+    deviation[i] = own > 5 * around[i] * around[i] ? finiteFloat(sqr(3 * own)) : 0.0f;
   });
   return deviation;
 }

@@ -47,8 +47,10 @@ void checkMemory(const Method& method, const Case& c, const std::vector<const ch
   resetHeapPeak();
   const MethodResult result = method.run(in);
   INFO(std::string(method.name()), " with ", bases.size(), " bases after ", of.passes, " passes");
-  const double threads = perPixel(static_cast<int64_t>(stated.eachThread) * kThreads);
-  CHECK(perPixel(heapPeak() - before) == doctest::Approx(stated.peak + threads).epsilon(0.1));
+  // On a busy machine one thread may have done all the work before another has begun.
+  const double thread = perPixel(static_cast<int64_t>(stated.eachThread)), peak = perPixel(heapPeak() - before);
+  CHECK(peak < 1.1 * (stated.peak + kThreads * thread));
+  CHECK(peak > 0.9 * (stated.peak + thread));
   CHECK(perPixel(heapBytes() - before) == doctest::Approx(stated.kept).epsilon(0.1));
 }
 

@@ -8,6 +8,7 @@
 
 #include "combiners/ensemble_weights.h"
 #include "combiners/registry.h"
+#include "combiners/relative_weights.h"
 #include "combiners/simplex_solver.h"
 #include "combiners/weight_filter.h"
 #include "tests/combiner_fixture.h"
@@ -332,12 +333,50 @@ TEST_CASE("Blocks share the weights of their first pixel") {
       for (size_t m = 0; m < all.planes.size(); ++m)
         for (int y = 0; y < o.height; ++y)
           for (int x = 0; x < o.width; ++x)
-            worst = std::max(
-                worst, std::fabs(blocks.planes[m].at(x, y) - all.planes[m].at(x - x % stride, y - y % stride)));
+            worst = std::max(worst,
+                             std::fabs(blocks.planes[m].at(x, y) - all.planes[m].at(x - x % stride, y - y % stride)));
       CHECK(worst < 1e-3f);
       CHECK(blocks.planes[0].at(stride, 0) != all.planes[0].at(stride + 1, 0));
     }
   }
+}
+
+TEST_CASE("Relative errors: the scale of a pixel, and no bright pixel decides for the dark ones around it") {
+  Rgb<float> guide(5, 4, 0.5f), variance(5, 4, 0.2f);
+  for (size_t ch = 0; ch < 3; ++ch) guide[ch].at(1, 0) = 2;
+  const Plane<float> roots = relativeErrorRoots(guide, variance);
+  CHECK(roots.at(4, 3) == doctest::Approx(1 / std::sqrt(0.25 + 0.01 + 0.3 * 0.2)));
+  const double level = (5 * 0.5 + 2) / 6;  // 3x2 pixels at the border
+  CHECK(roots.at(1, 0) == doctest::Approx(1 / std::sqrt(level * level + 0.01 + 0.3 * 0.2)));
+
+  // One base is right but for a lamp of 3x3 pixels, the other about the lamp only. Three of its pixels are in the
+  // patch.
+  const Case c = makeCase();
+  const auto image = [&](float around, float lamp) {
+    Rgb<float> out(c.truth.width(), c.truth.height(), around);
+    for (size_t ch = 0; ch < 3; ++ch)
+      for (int y = 19; y <= 21; ++y)
+        for (int u = 28; u <= 30; ++u) out[ch].at(u, y) = lamp;
+    return out;
+  };
+  const auto exactly = [&](float around, float lamp) {
+    Estimate e = c.pt();
+    e.mean = e.half[0] = e.half[1] = image(around, lamp);
+    e.variance = image(0, 0);
+    return e;
+  };
+  const Estimate x = exactly(0.1f, 2), lamp = exactly(0.4f, 2), dark = exactly(0.1f, 0.1f);
+  MethodInputs in = inputsOf(c);
+  in.unbiased = &x;
+  in.features = nullptr;
+  in.bases = {&lamp, &dark};
+  in.options.set("ensemble-filter", 0);
+  const auto beside = [&](double relative) {
+    in.options.set("ensemble-relative", relative);
+    return make_ensemble()->run(in).image.mean[0].at(33, 20);
+  };
+  CHECK(beside(1) < 0.2f);
+  CHECK(beside(0) > 0.28f);
 }
 
 TEST_CASE("The filter of weights is the formula at a pixel near a corner") {

@@ -356,6 +356,34 @@ TEST_CASE("The method beats both of its inputs with Y*, whose models at every fo
   }
 }
 
+TEST_CASE("The fit is taken where it helps: nearly as good as the better of with and without") {
+  CaseOptions o;
+  o.width = 96;
+  o.height = 72;
+  o.samples = 64;
+  Case c = makeCase(o);
+  Estimate exact = c.find("wide"), dark = c.find("wide");
+  exact.mean = exact.half[0] = exact.half[1] = c.truth;
+  dark.mean = c.truth;
+  for (size_t ch = 0; ch < 3; ++ch)
+    for (float& v : dark.mean[ch].data) v = 0.6f * v + 0.1f;
+  dark.half[0] = dark.half[1] = dark.mean;
+  const auto error = [&](const Estimate& y, double regression) {
+    MethodInputs in = inputsOf(c);
+    in.biased = &y;
+    in.options.set("js-regression", regression);
+    return meanSquaredError(make_js()->run(in).image.mean, c.truth);
+  };
+  for (const Estimate* y : std::initializer_list<const Estimate*>{&exact, &dark, &c.find("narrow"), &c.find("wide")}) {
+    const double without = error(*y, 0), with = error(*y, 1), chosen = error(*y, 2);
+    INFO("without ", without, " with ", with, " chosen ", chosen);
+    CHECK(chosen < 1.1 * std::min(without, with) + 1e-7);
+  }
+  // Both happen.
+  CHECK(error(exact, 0) < 0.5 * error(exact, 1));
+  CHECK(error(dark, 1) < 0.5 * error(dark, 0));
+}
+
 TEST_CASE("The combination converges to X") {
   CaseOptions o;
   o.noise = 0.001;
