@@ -368,7 +368,8 @@ std::string layerName(const std::string& name) {
   const size_t colon = name.find(':');
   std::string text = name.substr(0, colon);
   if (colon != std::string::npos)
-    text += "-" + std::filesystem::path(name.substr(colon + 1, name.find(':', colon + 1) - colon - 1)).stem().string();
+    text.append("-").append(
+        std::filesystem::path(name.substr(colon + 1, name.find(':', colon + 1) - colon - 1)).stem().string());
   std::replace(text.begin(), text.end(), '.', '-');
   return text;
 }
