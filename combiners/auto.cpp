@@ -17,8 +17,8 @@
 #include "combiners/error_map.h"
 #include "combiners/fused_estimate.h"
 #include "combiners/recipe.h"
-#include "combiners/relative_weights.h"
 #include "combiners/registry.h"
+#include "combiners/relative_weights.h"
 #include "combiners/shrinkage.h"
 
 namespace braid {

@@ -86,12 +86,13 @@ JamesSteinSettings settingsOf(const MethodOptions& o) {
 }
 
 // The fit where it is nearer to the other half than Y itself, by weights.
-void chooseBetween(const Estimate& x, const Estimate& y, const Features* features, Targets& t) {
+void chooseBetween(const Estimate& x, const Estimate& y, const Rgb<float>& variance, const Features* features,
+                   Targets& t) {
   Estimate fit;
   fit.mean = std::move(t.mean);
   for (int h = 0; h < 2; ++h) fit.half[h] = std::move(t.half[h]);
   const std::vector<const Estimate*> bases = {&fit, &y};
-  const WeightMaps weights = relativeWeights(x, bases, meanVariance(x), features, kChoiceRadius);
+  const WeightMaps weights = relativeWeights(x, bases, variance, features, kChoiceRadius);
   Estimate chosen = weightedEstimate(weights, bases);
   t.mean = std::move(chosen.mean);
   for (int h = 0; h < 2; ++h) {
@@ -100,7 +101,7 @@ void chooseBetween(const Estimate& x, const Estimate& y, const Features* feature
   }
 }
 
-Targets targetsOf(const MethodInputs& in, MethodResult& result) {
+Targets targetsOf(const MethodInputs& in, const Rgb<float>& variance, MethodResult& result) {
   const Estimate &x = *in.unbiased, &y = *in.biased;
   Targets t;
   if (!hasHalves(x) || !hasHalves(y) || in.options.number(kRegression) == 0) {
@@ -116,7 +117,7 @@ Targets targetsOf(const MethodInputs& in, MethodResult& result) {
     t.half[h] = std::move(fit.own[h]);
     t.crossed[h] = std::move(fit.crossed[h]);
   }
-  if (in.options.number(kRegression) == 2) chooseBetween(x, y, in.features, t);
+  if (in.options.number(kRegression) == 2) chooseBetween(x, y, variance, in.features, t);
   result.remarks.push_back(fit.report.attribute("js-regression"));
   return t;
 }
@@ -143,7 +144,7 @@ MethodResult JamesStein::run(const MethodInputs& in) const {
   const JamesSteinSettings settings = settingsOf(in.options);
   const bool halves = hasHalves(x) && hasHalves(y), crossed = halves && in.options.number(kCrossed) != 0;
   const Rgb<float> variance = meanVariance(x);
-  const Targets targets = targetsOf(in, result);
+  const Targets targets = targetsOf(in, variance, result);
   ShrunkImage shrunk[2];
   for (int h = 0; halves && h < 2; ++h) {
     shrunk[h] = jamesStein(x.half[h], halfVariance(x, variance, h), crossed ? targets.crossed[1 - h] : targets.half[h],

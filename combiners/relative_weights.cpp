@@ -26,8 +26,10 @@ Plane<float> relativeErrorRoots(const Rgb<float>& guide, const Rgb<float>& varia
   const Plane<float> noise =
       channelMean(variance, [&](size_t i, size_t c) { return static_cast<double>(variance[c][i]); });
   Plane<float> out(guide.width(), guide.height());
-  for (size_t i = 0; i < out.size(); ++i)
-    out[i] = finiteFloat(1 / std::sqrt(level[i] * level[i] + 0.01 + kVarianceShare * static_cast<double>(noise[i])));
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i)
+      out[i] = finiteFloat(1 / std::sqrt(level[i] * level[i] + 0.01 + kVarianceShare * static_cast<double>(noise[i])));
+  });
   return out;
 }
 

@@ -65,7 +65,7 @@ def _lights():
     yield Case("behind 1 % transmission", lambda: s.behind_pane(0.01),
                short=True)
     yield Case("1e6 lights", s.many_lights, seconds=120, agree=("bdpt",),
-               memory=2048 * MIB, combine=False)
+               memory=2048 * MIB)
 
 
 def _placement():
@@ -168,7 +168,7 @@ def _depths():
                mean=1000 * (1 - 0.999 ** 32), size="24x16", short=True)
     yield Case("white box, depth 10000", lambda: s.white_box(0.999, 1),
                ("--max-depth", "10000"), size="6x4", spp=8, mean=1.0,
-               seconds=240, combine=False)
+               seconds=240)
 
 
 def _images():
@@ -204,9 +204,20 @@ def _images():
     for size in ("1x1", "1x64", "64x1"):
         yield Case(f"image {size}", _room, size=size, spp=32,
                    short=size != "64x1")
-    yield Case("image 8192x8192", lambda: s.room(objects=s.diffuse_ball),
-               ("--max-depth", "2"), size="8192x8192", spp=1, only=("pt",),
-               combine=False, seconds=600, memory=16384 * MIB)
+    # One at a time, in 16 GiB; what needs more is refused with what needs it.
+    large = dict(size="8192x8192", spp=1, combine=False, seconds=1200,
+                 memory=16384 * MIB)
+    for name, options in (("pt", ()), ("bdpt", ()), ("crn", ()),
+                          ("gdpt", ()), ("sppm", ("--photons", "1000000"))):
+        yield Case(f"image 8192x8192, {name}",
+                   lambda: s.room(objects=s.diffuse_ball),
+                   ("--max-depth", "2", *options), only=(name,), **large)
+    for name, spp, combine, needs in (("vcm", 1, False, "vcm passes"),
+                                      ("pt", 4, True, "combining")):
+        yield Case(f"image 8192x8192, {name if spp == 1 else 'combined'}",
+                   _room, ("--memory-limit", "16G"), only=(name,), code=5,
+                   **large | dict(spp=spp, combine=combine),
+                   says=f"for {needs}, and the limit is 16384 MiB")
 
 
 CASES = {case.name: case for part in (
