@@ -212,12 +212,12 @@ def _images():
         yield Case(f"image 8192x8192, {name}",
                    lambda: s.room(objects=s.diffuse_ball),
                    ("--max-depth", "2", *options), only=(name,), **large)
-    for name, spp, combine, needs in (("vcm", 1, False, "vcm passes"),
-                                      ("pt", 4, True, "combining")):
-        yield Case(f"image 8192x8192, {name if spp == 1 else 'combined'}",
-                   _room, ("--memory-limit", "16G"), only=(name,), code=5,
-                   **large | dict(spp=spp, combine=combine),
-                   says=f"for {needs}, and the limit is 16384 MiB")
+    for name, only, combine in (("vcm", ("vcm",), False),
+                                ("combined", ("pt", "crn"), True)):
+        yield Case(f"image 8192x8192, {name}", _room,
+                   ("--memory-limit", "16G"), only=only, code=5,
+                   says="and the limit is 16384 MiB",
+                   **large | dict(spp=4, combine=combine))
 
 
 CASES = {case.name: case for part in (
