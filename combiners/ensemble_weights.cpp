@@ -17,105 +17,141 @@ constexpr int kTileWidth = 128, kTileHeight = 32;
 // Row `y` of a plane from column x on.
 const float* rowOf(const Plane<float>& p, int x, int y) { return p.data.data() + p.index(x, y); }
 
+void addRow(const double* __restrict in, int count, double* __restrict out) {
+  for (int x = 0; x < count; ++x) out[x] += in[x];
+}
+
+void addWeighted(const float* __restrict weight, const float* __restrict image, std::vector<double>& sum) {
+  double* __restrict out = sum.data();
+  for (size_t i = 0; i < sum.size(); ++i) out[i] += static_cast<double>(weight[i]) * static_cast<double>(image[i]);
+}
+
+// out[x] = the sum of the n values from in[x] on, put together from sums of 1, 2, 4, … of them. `in` holds
+// count + n - 1 values and is overwritten, as is `spare`, of the same size.
+void windowSums(double* in, double* spare, int count, int n, double* out) {
+  std::fill_n(out, count, 0.0);
+  for (int power = 1, at = 0;; power *= 2) {
+    if (n & power) {
+      addRow(in + at, count, out);
+      at += power;
+    }
+    if (2 * power > n) return;
+    const double* __restrict first = in, * __restrict second = in + power;
+    double* __restrict both = spare;
+    for (int x = 0; x < count + n - 2 * power; ++x) both[x] = first[x] + second[x];
+    std::swap(in, spare);
+  }
+}
+
 // Solves the pixels of one tile.
 class TileWeights {
  public:
   TileWeights(const Estimate& x, const std::vector<const Estimate*>& bases, const EnsembleChoices& choices)
-      : x_(x), bases_(bases), choices_(choices), pairs_(bases.size() * (bases.size() + 1) / 2) {}
+      : x_(x),
+        bases_(bases),
+        choices_(choices),
+        pairs_(bases.size() * (bases.size() + 1) / 2),
+        terms_(choices.fullError ? 3 : 2) {}
   void solve(const PixelRect& tile, WeightMaps& out);
 
  private:
   void startSums(const PixelRect& tile);
   void errorsOfRow(size_t c, int y, double* out);
   void addChannels(size_t first, size_t last);
-  void addPatchRow(size_t pair, const double* products, int y);
+  void addProducts(size_t i, size_t j, size_t channels);
+  void sumAlongRows();
   void writeWeights(size_t c, WeightMaps& out);
   void fillBlock(int column, int row, float weight, Plane<float>& out) const;
 
   const Estimate& x_;
   const std::vector<const Estimate*>& bases_;
   const EnsembleChoices& choices_;
-  size_t pairs_;
+  size_t pairs_, terms_;
   // Row `row` of the sums of a pair: those of the rows 0, stride, 2 stride, … of the tile.
   double* sumsOfRow(size_t pair, int row) {
-    return sums_.data() +
-           (pair * static_cast<size_t>(rows_) + static_cast<size_t>(row)) * static_cast<size_t>(tile_.width());
+    return sums_.data() + (pair * static_cast<size_t>(rows_) + static_cast<size_t>(row)) * products_.size();
   }
 
   PixelRect tile_, samples_;    // the pixels solved, and those in their patches
   int rows_ = 0, columns_ = 0;  // of the blocks that share their weights
-  // Of a row, three terms a channel, base and column: e^A, e^B, (y^A - y^B) / sqrt(2).
+  // Of a row, by channel, base, term and column. The terms are e^A, e^B and, where asked for, (y^A - y^B) / sqrt(2).
   std::vector<double> errors_;
-  std::vector<double> products_, rowSums_;  // of one row and pair
-  std::vector<double> sums_;                // M by pair, row of blocks and column of pixels
+  std::vector<double> products_;     // of one row and pair, from the leftmost column of any patch on
+  std::vector<double> row_, spare_;  // of sums
+  std::vector<double> sums_;         // M by pair, row of blocks and column of pixels
 };
 
 void TileWeights::startSums(const PixelRect& tile) {
   tile_ = tile;
   samples_ = intersection(grown(tile, choices_.patchRadius), {0, 0, x_.mean.width(), x_.mean.height()});
-  errors_.resize((choices_.shared ? 9 : 3) * bases_.size() * static_cast<size_t>(samples_.width()));
-  products_.resize(static_cast<size_t>(samples_.width()));
-  rowSums_.resize(static_cast<size_t>(tile.width()));
+  errors_.resize((choices_.shared ? 3 : 1) * bases_.size() * terms_ * static_cast<size_t>(samples_.width()));
+  products_.assign(static_cast<size_t>(tile.width() + 2 * choices_.patchRadius), 0.0);
+  row_.resize(products_.size());
+  spare_.resize(products_.size());
   rows_ = (tile.height() + choices_.stride - 1) / choices_.stride;
   columns_ = (tile.width() + choices_.stride - 1) / choices_.stride;
-  sums_.assign(pairs_ * static_cast<size_t>(tile.width() * rows_), 0.0);
 }
 
 void TileWeights::errorsOfRow(size_t c, int y, double* out) {
   const auto width = static_cast<size_t>(samples_.width());
   const float *xa = rowOf(x_.half[0][c], samples_.x0, y), *xb = rowOf(x_.half[1][c], samples_.x0, y);
-  for (size_t b = 0; b < bases_.size(); ++b) {
-    const float *ya = rowOf(bases_[b]->half[0][c], samples_.x0, y), *yb = rowOf(bases_[b]->half[1][c], samples_.x0, y);
-    double *ea = out + 3 * b * width, *eb = ea + width, *d = eb + width;
+  for (const Estimate* base : bases_) {
+    const float *ya = rowOf(base->half[0][c], samples_.x0, y), *yb = rowOf(base->half[1][c], samples_.x0, y);
+    double *ea = out, *eb = ea + width, *d = eb + width;
     for (size_t i = 0; i < width; ++i) {
       ea[i] = static_cast<double>(ya[i]) - static_cast<double>(xb[i]);
       eb[i] = static_cast<double>(yb[i]) - static_cast<double>(xa[i]);
-      d[i] = choices_.fullError ? 0.70710678118654752 * (static_cast<double>(ya[i]) - static_cast<double>(yb[i])) : 0.0;
     }
-    if (!choices_.rootWeights) continue;
-    const float* root = rowOf(*choices_.rootWeights, samples_.x0, y);
-    for (double* e : {ea, eb, d})
-      for (size_t i = 0; i < width; ++i) e[i] *= static_cast<double>(root[i]);
+    for (size_t i = 0; i < width && choices_.fullError; ++i)
+      d[i] = 0.70710678118654752 * (static_cast<double>(ya[i]) - static_cast<double>(yb[i]));
+    if (choices_.rootWeights) {
+      const float* root = rowOf(*choices_.rootWeights, samples_.x0, y);
+      for (double* e = out; e != out + terms_ * width; e += width)
+        for (size_t i = 0; i < width; ++i) e[i] *= static_cast<double>(root[i]);
+    }
+    out += terms_ * width;
   }
 }
 
-// Adds the patch sums of a row of samples to the rows of the tile whose patches hold it.
-void TileWeights::addPatchRow(size_t pair, const double* products, int y) {
-  const int radius = choices_.patchRadius, width = tile_.width();
-  for (int x = 0; x < width; ++x) rowSums_[static_cast<size_t>(x)] = 0;
-  for (int k = -radius; k <= radius; ++k) {
-    const int from = std::max(tile_.x0, samples_.x0 - k), to = std::min(tile_.x1, samples_.x1 - k);
-    const double* in = products + (from + k - samples_.x0);
-    double* out = rowSums_.data() + (from - tile_.x0);
-    for (int x = 0; x < to - from; ++x) out[x] += in[x];
-  }
-  const int stride = choices_.stride, first = (std::max(tile_.y0, y - radius) - tile_.y0 + stride - 1) / stride;
-  for (int row = first; tile_.y0 + row * stride < std::min(tile_.y1, y + radius + 1); ++row) {
-    double* out = sumsOfRow(pair, row);
-    for (int x = 0; x < width; ++x) out[x] += rowSums_[static_cast<size_t>(x)];
+// The products of the errors of two bases along a row, summed over the channels; a common factor of two does not
+// matter.
+void TileWeights::addProducts(size_t i, size_t j, size_t channels) {
+  const auto width = static_cast<size_t>(samples_.width()), ofBase = terms_ * width;
+  double* __restrict out = products_.data() + (samples_.x0 - (tile_.x0 - choices_.patchRadius));
+  std::fill_n(out, width, 0.0);
+  for (size_t c = 0; c < channels; ++c) {
+    const double* __restrict p = errors_.data() + (c * bases_.size() + i) * ofBase;
+    const double* __restrict q = errors_.data() + (c * bases_.size() + j) * ofBase;
+    for (size_t k = 0; k < width; ++k) out[k] += p[k] * q[k] + p[width + k] * q[width + k];
+    for (size_t k = 0; k < width && choices_.fullError; ++k) out[k] -= p[2 * width + k] * q[2 * width + k];
   }
 }
 
-// Adds the errors of the channels [first, last) to the sums.
+// Adds the products of the channels [first, last) to the sums of all rows of blocks whose patches hold them.
 void TileWeights::addChannels(size_t first, size_t last) {
-  const auto width = static_cast<size_t>(samples_.width());
-  const size_t ofChannel = 3 * bases_.size() * width;
+  const int radius = choices_.patchRadius, stride = choices_.stride, count = static_cast<int>(products_.size());
+  const size_t ofChannel = bases_.size() * terms_ * static_cast<size_t>(samples_.width());
   for (int y = samples_.y0; y < samples_.y1; ++y) {
     for (size_t c = first; c < last; ++c) errorsOfRow(c, y, errors_.data() + (c - first) * ofChannel);
+    const int from = (std::max(tile_.y0, y - radius) - tile_.y0 + stride - 1) / stride;
     size_t pair = 0;
     for (size_t i = 0; i < bases_.size(); ++i)
       for (size_t j = 0; j <= i; ++j, ++pair) {
-        std::fill(products_.begin(), products_.end(), 0.0);
-        for (size_t c = first; c < last; ++c) {
-          const double* errors = errors_.data() + (c - first) * ofChannel;
-          const double *p = errors + 3 * i * width, *q = errors + 3 * j * width;
-          // Both halves and the reduction; a common factor of two does not matter.
-          for (size_t k = 0; k < width; ++k)
-            products_[k] += p[k] * q[k] + p[width + k] * q[width + k] - p[2 * width + k] * q[2 * width + k];
-        }
-        addPatchRow(pair, products_.data(), y);
+        addProducts(i, j, last - first);
+        for (int row = from; tile_.y0 + row * stride < std::min(tile_.y1, y + radius + 1); ++row)
+          addRow(products_.data(), count, sumsOfRow(pair, row));
       }
   }
+}
+
+void TileWeights::sumAlongRows() {
+  const int window = 2 * choices_.patchRadius + 1;
+  for (size_t pair = 0; pair < pairs_; ++pair)
+    for (int row = 0; row < rows_; ++row) {
+      double* sums = sumsOfRow(pair, row);
+      std::copy_n(sums, products_.size(), row_.data());
+      windowSums(row_.data(), spare_.data(), tile_.width(), window, sums);
+    }
 }
 
 // Solves for all blocks of the tile; the weights are those of channel c, or of all.
@@ -150,8 +186,11 @@ void TileWeights::solve(const PixelRect& tile, WeightMaps& out) {
   startSums(tile);
   const size_t together = choices_.shared ? 3 : 1;
   for (size_t c = 0; c < 3; c += together) {
-    std::fill(sums_.begin(), sums_.end(), 0.0);
-    runVectorised([&] { addChannels(c, c + together); });
+    sums_.assign(pairs_ * static_cast<size_t>(rows_) * products_.size(), 0.0);
+    runVectorised([&] {
+      addChannels(c, c + together);
+      sumAlongRows();
+    });
     writeWeights(c, out);
   }
 }
@@ -175,15 +214,16 @@ WeightMaps ensembleWeights(const Estimate& unbiased, const std::vector<const Est
 
 Rgb<float> weightedImage(const WeightMaps& weights, const std::vector<const Rgb<float>*>& images) {
   Rgb<float> out(images[0]->width(), images[0]->height());
-  for (size_t c = 0; c < 3; ++c)
-    parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) {
-        double sum = 0;
-        for (size_t b = 0; b < images.size(); ++b)
-          sum += static_cast<double>(weights.of(b, c)[i]) * static_cast<double>((*images[b])[c][i]);
-        out[c][i] = finiteFloat(sum);
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    std::vector<double> sum(end - begin);
+    runVectorised([&] {
+      for (size_t c = 0; c < 3; ++c) {
+        std::fill(sum.begin(), sum.end(), 0.0);
+        for (size_t b = 0; b < images.size(); ++b) addWeighted(&weights.of(b, c)[begin], &(*images[b])[c][begin], sum);
+        for (size_t i = begin; i < end; ++i) out[c][i] = finiteFloat(sum[i - begin]);
       }
     });
+  });
   return out;
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "combiners/denoise/window.h"
 #include "combiners/finite_float.h"
 #include "combiners/mirror.h"
 
@@ -135,25 +136,44 @@ struct Terms {
   Plane<double> squares, noise;
 };
 
+// squares += weight max(d², rounding) / unit and noise += weight variance / unit of one channel; unit is 1 for null.
+void addTerms(const float* __restrict x, const float* __restrict y, const float* __restrict variance,
+              const float* __restrict inverseUnit, double weight, size_t count, double* __restrict squares,
+              double* __restrict noise) {
+  for (size_t i = 0; i < count; ++i) {
+    const double inverse = weight * (inverseUnit ? static_cast<double>(inverseUnit[i]) : 1.0);
+    const auto value = static_cast<double>(x[i]), difference = value - static_cast<double>(y[i]);
+    squares[i] += inverse * std::max(difference * difference, kRelativeLeast * value * value);
+    noise[i] += inverse * static_cast<double>(variance[i]);
+  }
+}
+
 // Of the channels [first, first + together), averaged; nothing of gated pixels.
 Terms termsOf(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale& scale, const Rgb<float>& y,
               size_t first, size_t together) {
   Terms out{Plane<double>(x.width(), x.height()), Plane<double>(x.width(), x.height())};
   const double weight = 1.0 / static_cast<double>(together);
-  forAll(x.size(), [&](size_t i) {
-    if (gated(scale, x, y, i)) return;
-    double squares = 0, noise = 0;
+  parallelChunks(x.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t c = first; c < first + together; ++c) {
-      const double inverse =
-          weight * (scale.inverseUnit[c].empty() ? 1.0 : static_cast<double>(scale.inverseUnit[c][i]));
-      const auto value = static_cast<double>(x[c][i]), difference = value - static_cast<double>(y[c][i]);
-      squares += inverse * std::max(difference * difference, kRelativeLeast * value * value);
-      noise += inverse * static_cast<double>(variance[c][i]);
+      const float* unit = scale.inverseUnit[c].empty() ? nullptr : &scale.inverseUnit[c][begin];
+      runVectorised([&] {
+        addTerms(&x[c][begin], &y[c][begin], &variance[c][begin], unit, weight, end - begin, &out.squares[begin],
+                 &out.noise[begin]);
+      });
     }
-    out.squares[i] = squares;
-    out.noise[i] = noise;
+    for (size_t i = begin; i < end; ++i)
+      if (gated(scale, x, y, i)) out.squares[i] = out.noise[i] = 0;
   });
   return out;
+}
+
+// out = max(0, y + factor (x - y))
+void blendRow(const float* __restrict x, const float* __restrict y, const double* __restrict factor, size_t count,
+              float* __restrict out) {
+  for (size_t i = 0; i < count; ++i) {
+    const auto other = static_cast<double>(y[i]);
+    out[i] = finiteFloat(std::max(0.0, other + factor[i] * (static_cast<double>(x[i]) - other)));
+  }
 }
 
 void keepFactors(const Plane<double>& factor, size_t firstChannel, size_t lastChannel, Rgb<float>& out) {
@@ -192,12 +212,11 @@ ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const No
   for (size_t first = 0; first < 3; first += together) {
     const Terms terms = termsOf(x, variance, scale, y, first, together);
     Plane<double> factor = factors(terms.squares, terms.noise, settings);
-    forAll(x.size(), [&](size_t i) {
-      if (gated(scale, x, y, i)) factor[i] = 0;
-      for (size_t c = first; c < first + together; ++c) {
-        const auto other = static_cast<double>(y[c][i]);
-        out.image[c][i] = finiteFloat(std::max(0.0, other + factor[i] * (static_cast<double>(x[c][i]) - other)));
-      }
+    parallelChunks(x.size(), kPixelChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i)
+        if (gated(scale, x, y, i)) factor[i] = 0;
+      for (size_t c = first; c < first + together; ++c)
+        runVectorised([&] { blendRow(&x[c][begin], &y[c][begin], &factor[begin], end - begin, &out.image[c][begin]); });
     });
     if (settings.keepFactors) keepFactors(factor, first, first + together, out.factor);
   }

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <memory>
 #include <mutex>
+#include <span>
 
 #include "combiners/normal_equations.h"
 #include "renderer/core/error.h"
@@ -18,7 +19,7 @@ constexpr int kRadius = kPatchWelchWindow, kSide = 2 * kRadius + 1;
 // are then at one distance, and loops run over the whole window at once. The last two columns of a "row" of kPitch
 // belong to the border and have weight zero, as have the corners outside of the disc.
 constexpr int kPitch = kSide + 2, kBorderedSize = kPitch * kPitch;
-constexpr int kUnit = 16, kLanes = 8;
+constexpr int kUnit = 16;
 constexpr int kCount = (kSide * kPitch + kUnit - 1) / kUnit * kUnit;
 constexpr int kCapacity = (kCount + 2 * kPitch + 2 + kUnit - 1) / kUnit * kUnit;
 constexpr int kToWindow = kPitch + 1;  // from the first bordered pixel to the first one of the window
@@ -36,12 +37,18 @@ struct alignas(64) Windowed {
   float v[kCount] = {};
 };
 
-// Sums over the window are kept in eight lanes whatever the instruction set, for the same bits everywhere.
-using Lanes = float __attribute__((vector_size(kLanes * sizeof(float))));
+// Sums over the window are kept in so many lanes whatever the instruction set, for the same bits everywhere.
+using Unit = float __attribute__((vector_size(kUnit * sizeof(float))));
 
-double sumOf(const Lanes& lanes) {
+Unit unitAt(const float* p) {
+  Unit out;
+  std::memcpy(&out, p, sizeof(out));
+  return out;
+}
+
+double sumOf(const Unit& lanes) {
   double sum = 0;
-  for (int l = 0; l < kLanes; ++l) sum += static_cast<double>(lanes[l]);
+  for (int l = 0; l < kUnit; ++l) sum += static_cast<double>(lanes[l]);
   return sum;
 }
 
@@ -49,35 +56,39 @@ double sumOf(const Lanes& lanes) {
 template <int kRow>
 void momentsOfRow(const std::array<Windowed, kColumns>& columns, const Windowed& weights,
                   const std::array<const float*, 3>& u, NormalEquations& out) {
-  Lanes products[kRow + 1] = {}, rhs[3] = {};
-  for (int i = 0; i < kCount; i += kLanes) {
-    Lanes wx, x;
-    std::memcpy(&wx, weights.v + i, sizeof(wx));
-    std::memcpy(&x, columns[kRow].v + i, sizeof(x));
-    wx *= x;
-    for (int k = 0; k <= kRow; ++k) {
-      std::memcpy(&x, columns[static_cast<size_t>(k)].v + i, sizeof(x));
-      products[k] += wx * x;
-    }
-    for (size_t c = 0; c < 3; ++c) {
-      std::memcpy(&x, u[c] + i, sizeof(x));
-      rhs[c] += wx * x;
-    }
+  Unit products[kRow + 1] = {}, rhs[3] = {};
+  for (int i = 0; i < kCount; i += kUnit) {
+    const Unit wx = unitAt(weights.v + i) * unitAt(columns[kRow].v + i);
+    for (int k = 0; k <= kRow; ++k) products[k] += wx * unitAt(columns[static_cast<size_t>(k)].v + i);
+    for (size_t c = 0; c < 3; ++c) rhs[c] += wx * unitAt(u[c] + i);
   }
   for (int k = 0; k <= kRow; ++k) out.matrix[kRow][static_cast<size_t>(k)] = sumOf(products[k]);
   for (size_t c = 0; c < 3; ++c) out.rhs[kRow][c] = sumOf(rhs[c]);
 }
 
-void inverseVariances(const float* __restrict v, float centre, float* __restrict out) {
-  for (int i = 0; i < kCount; ++i) out[i] = 1.0f / ((centre + v[i]) + kPatchWelchEpsilon);
-}
+// The neighbour o of the centre within its patch: where the window that lies around it begins, and itself.
+struct PatchShift {
+  int window, centre;
+};
 
-// sum += (u_centre - u)² inverse, over pixels inside the image.
-void addDifferences(const float* __restrict u, float centre, const float* __restrict inverse,
-                    const float* __restrict inside, float* __restrict sum) {
-  for (int i = 0; i < kCount; ++i) {
-    const float d = centre - u[i];
-    sum[i] += inside[i] > 0 ? d * d * inverse[i] : 0.0f;
+// sum_i = Σ over the shifts of (u_centre - u)² / (V_centre + V), summed over the channels, of pixels inside the image.
+template <size_t kImages, bool kClipped>
+void squaredDifferences(const std::vector<std::array<Bordered, 3>>& radiance, const std::array<Bordered, 3>& variance,
+                        const Bordered& inside, std::span<const PatchShift> shifts,
+                        std::array<Windowed, PatchWelchInput::kMaxImages>& out) {
+  for (int i = 0; i < kCount; i += kUnit) {
+    Unit sum[kImages] = {};
+    for (const PatchShift& shift : shifts)
+      for (size_t c = 0; c < 3; ++c) {
+        const Unit v = variance[c].v[shift.centre] + unitAt(variance[c].v + shift.window + i);
+        Unit inverse = 1.0f / (v + kPatchWelchEpsilon);
+        if (kClipped) inverse = unitAt(inside.v + shift.window + i) > 0 ? inverse : Unit{};
+        for (size_t k = 0; k < kImages; ++k) {
+          const Unit d = radiance[k][c].v[shift.centre] - unitAt(radiance[k][c].v + shift.window + i);
+          sum[k] += d * d * inverse;
+        }
+      }
+    for (size_t k = 0; k < kImages; ++k) std::memcpy(out[k].v + i, &sum[k], sizeof(Unit));
   }
 }
 
@@ -121,8 +132,16 @@ void featureColumn(const float* __restrict feature, float centre, const float* _
   for (int i = 0; i < kCount; ++i) column[i] *= scale;
 }
 
-void addScaled(const float* __restrict column, float coefficient, float* __restrict sum) {
-  for (int i = 0; i < kCount; ++i) sum[i] += coefficient * column[i];
+// Σ_k coefficient_k column_k of one channel.
+void predict(const std::array<Windowed, kColumns>& columns, const NormalSolution& solution, size_t channel,
+             float* __restrict out) {
+  float coefficients[kColumns];
+  for (size_t k = 0; k < kColumns; ++k) coefficients[k] = static_cast<float>(solution.coefficients[k][channel]);
+  for (int i = 0; i < kCount; i += kUnit) {
+    Unit sum = coefficients[0] - Unit{};
+    for (size_t k = 1; k < kColumns; ++k) sum += coefficients[k] * unitAt(columns[k].v + i);
+    std::memcpy(out + i, &sum, sizeof(sum));
+  }
 }
 
 void addPrediction(const float* __restrict w, const float* __restrict p0, const float* __restrict p1,
@@ -204,9 +223,9 @@ class TileRegression {
   // Copies what the fit around (x, y) reads; zero outside the image.
   void gather(int x, int y) {
     const PixelRect window = grown({x, y, x + 1, y + 1}, kRadius + 1), pixels = intersection(window, image_);
-    const bool clipped = pixels.width() < kPitch || pixels.height() < kPitch;
+    clipped_ = pixels.width() < kPitch || pixels.height() < kPitch;
     const auto copy = [&](const std::vector<float>& from, Bordered& to) {
-      if (clipped) std::fill_n(to.v, kBorderedSize, 0.0f);
+      if (clipped_) std::fill_n(to.v, kBorderedSize, 0.0f);
       for (int row = pixels.y0; row < pixels.y1; ++row)
         std::memcpy(to.v + (row - window.y0) * kPitch + (pixels.x0 - window.x0),
                     from.data() + tile_.index(pixels.x0, row), static_cast<size_t>(pixels.width()) * sizeof(float));
@@ -237,20 +256,22 @@ class TileRegression {
 
   // For each image the sum over 3 x 3 pairs of (u_p - u_q)² / (V_p + V_q), summed over the channels.
   void sumPatches(int x, int y) {
-    std::fill_n(inverseCount_.v, kCount, 0.0f);
-    for (size_t i = 0; i < radiance_.size(); ++i) std::fill_n(patches_[i].v, kCount, 0.0f);
+    std::fill_n(inverseCount_.v, kCount, clipped_ ? 0.0f : 9.0f);
+    std::array<PatchShift, 9> shifts;
+    size_t count = 0;
     for (int oy = -1; oy <= 1; ++oy)
       for (int ox = -1; ox <= 1; ++ox) {
         if (x + ox < 0 || x + ox >= image_.x1 || y + oy < 0 || y + oy >= image_.y1) continue;
-        const int shift = kToWindow + oy * kPitch + ox, centre = shift + kCentre;
-        addCounts(inside_.v + shift, inverseCount_.v);
-        for (size_t c = 0; c < 3; ++c) {
-          inverseVariances(variance_[c].v + shift, variance_[c].v[centre], inverse_.v);
-          for (size_t i = 0; i < radiance_.size(); ++i)
-            addDifferences(radiance_[i][c].v + shift, radiance_[i][c].v[centre], inverse_.v, inside_.v + shift,
-                           patches_[i].v);
-        }
+        const int shift = kToWindow + oy * kPitch + ox;
+        if (clipped_) addCounts(inside_.v + shift, inverseCount_.v);
+        shifts[count++] = {shift, shift + kCentre};
       }
+    const std::span<const PatchShift> valid(shifts.data(), count);
+    const auto sum = [&]<size_t kImages>() {
+      return clipped_ ? squaredDifferences<kImages, true>(radiance_, variance_, inside_, valid, patches_)
+                      : squaredDifferences<kImages, false>(radiance_, variance_, inside_, valid, patches_);
+    };
+    radiance_.size() == 3 ? sum.template operator()<3>() : sum.template operator()<1>();
   }
 
   void count(const NormalSolution& solution) {
@@ -277,11 +298,7 @@ class TileRegression {
     momentsOfRow<6>(columns_, weights_, u, equations_);
     momentsOfRow<7>(columns_, weights_, u, equations_);
     const NormalSolution solution = solve(equations_, kRidge * equations_.matrix[0][0], false);
-    for (size_t c = 0; c < 3; ++c) {
-      std::fill_n(prediction_[c].v, kCount, static_cast<float>(solution.coefficients[0][c]));
-      for (size_t k = 1; k < kColumns; ++k)
-        addScaled(columns_[k].v, static_cast<float>(solution.coefficients[k][c]), prediction_[c].v);
-    }
+    for (size_t c = 0; c < 3; ++c) predict(columns_, solution, c, prediction_[c].v);
     return solution;
   }
 
@@ -302,6 +319,7 @@ class TileRegression {
   std::vector<std::array<std::vector<float>, 4>> sums_;  // per image: of the weights, and of weighted predictions
 
   // Of the current fit.
+  bool clipped_ = false;  // by the borders of the image
   std::vector<std::array<Bordered, 3>> radiance_;
   std::array<Bordered, 3> variance_;
   std::array<Bordered, PatchWelchTile::kGuides> guide_;
@@ -318,8 +336,8 @@ class TileRegression {
 std::vector<Rgb<float>> patchWelchFirstOrder(const PatchWelchInput& input, const std::vector<Rgb<float>>& zeroOrder,
                                              const FirstOrderOptions& options, const std::atomic<bool>* cancel,
                                              RegressionReport* report) {
-  BRAID_ASSERT(!input.images.empty() && input.images.size() <= PatchWelchInput::kMaxImages &&
-               zeroOrder.size() == input.images.size() && options.stride >= 1 && options.tileSize >= 1);
+  BRAID_ASSERT((input.images.size() == 1 || input.images.size() == 3) && zeroOrder.size() == input.images.size() &&
+               options.stride >= 1 && options.tileSize >= 1);
   std::vector<Rgb<float>> out(input.images.size(), Rgb<float>(input.width(), input.height()));
   std::mutex reporting;
   forEachTile(input.width(), input.height(), options.tileSize, options.tileSize, [&](const PixelRect& tile) {

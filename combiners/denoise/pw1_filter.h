@@ -2,7 +2,7 @@
 // The first-order patch-Welch filter: a weighted linear fit of the albedo-divided radiance over position, normal, depth
 // and visibility, with the weights of the patch-Welch filter.
 //
-// A fit is made around every fourth pixel in x and y, and all pixels i of its window receive its prediction with the
+// A fit is made around every fifth pixel in x and y, and all pixels i of its window receive its prediction with the
 // weight w(c, i) that they have in it (collaborative regression; Bitterli et al. 2016, "Nonlinearly Weighted
 // First-order Regression for Denoising Monte Carlo Renderings"). Pixels that no fit accounts for, such as thin geometry
 // between the centres, must not fall back to the noisy input:
@@ -18,8 +18,8 @@ namespace braid {
 
 struct FirstOrderOptions {
   double threshold = kPatchWelchWideThreshold;
-  int stride = 4;   // of the centres; >= 1
-  float kappa = 2;  // weight of the zero-order result; 0 only where every pixel is a centre
+  int stride = 5;      // of the centres; >= 1
+  float kappa = 0.8f;  // weight of the zero-order result; 0 only where every pixel is a centre
   int tileSize = 128;
 };
 

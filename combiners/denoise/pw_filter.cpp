@@ -2,6 +2,7 @@
 #include "combiners/denoise/pw_filter.h"
 
 #include <cmath>
+#include <cstring>
 
 #include "renderer/core/error.h"
 
@@ -77,26 +78,34 @@ void weightRow(float* __restrict tolerance, const float* __restrict edge, int co
   for (int x = 0; x < count; ++x) tolerance[x] = tolerance[x] * tolerance[x] * edge[x];
 }
 
+using Lanes = float __attribute__((vector_size(kRowUnit * sizeof(float))));
+
 // Sums of w and of w u for the pixels of a tile, row by row.
 struct Sums {
   std::array<std::vector<float>, 4> plane;  // weight, then red, green, blue
 };
 
-// The four sums of a row. Each pointer is a parameter: only so does the compiler keep the promise of no overlap.
-void addWeighted(const float* __restrict w, const float* __restrict u0, const float* __restrict u1,
-                 const float* __restrict u2, int count, float* __restrict total, float* __restrict red,
-                 float* __restrict green, float* __restrict blue) {
-  for (int x = 0; x < count; ++x) {
-    total[x] += w[x];
-    red[x] += w[x] * u0[x];
-    green[x] += w[x] * u1[x];
-    blue[x] += w[x] * u2[x];
-  }
-}
+// A row of weights and of the pixels that they belong to.
+struct WeightedRow {
+  const float* w;
+  Rows3 u;
+};
 
-void accumulateRow(const float* w, const Rows3& u, int count, Sums& sums, ptrdiff_t at) {
-  auto& s = sums.plane;
-  addWeighted(w, u[0], u[1], u[2], count, s[0].data() + at, s[1].data() + at, s[2].data() + at, s[3].data() + at);
+// Adds w and w u of all rows to the sums of a row of `count` pixels, a multiple of kRowUnit.
+void addRows(const std::vector<WeightedRow>& rows, int count, Sums& sums, ptrdiff_t at) {
+  for (int x = 0; x < count; x += kRowUnit) {
+    Lanes sum[4], w, u;
+    for (size_t k = 0; k < 4; ++k) std::memcpy(&sum[k], sums.plane[k].data() + at + x, sizeof(Lanes));
+    for (const WeightedRow& row : rows) {
+      std::memcpy(&w, row.w + x, sizeof(w));
+      sum[0] += w;
+      for (size_t c = 0; c < 3; ++c) {
+        std::memcpy(&u, row.u[c] + x, sizeof(u));
+        sum[1 + c] += w * u;
+      }
+    }
+    for (size_t k = 0; k < 4; ++k) std::memcpy(sums.plane[k].data() + at + x, &sum[k], sizeof(Lanes));
+  }
 }
 
 // The filter in one tile. The weight of a pair is the same seen from either pixel, hence only one of d and -d is
@@ -110,15 +119,18 @@ class TileFilter {
         height_(input.height()),
         thresholds_(squaredThresholds),
         tile_(input, intersection(grown(tile, kPatchWelchWindow + 1), {0, 0, width_, height_})),
-        images_(input.images.size()) {
-    const auto row = static_cast<size_t>(roundUp(tile.width() + kPatchWelchWindow + 2) + 2 * kRowUnit);
+        images_(input.images.size()),
+        row_(roundUp(tile.width() + 2 * kPatchWelchWindow) + 2 * kRowUnit) {
+    const auto row = static_cast<size_t>(row_);
     for (std::vector<float>& b : inverse_) b.resize(row);
     for (Column& column : columns_) {
       for (auto& image : column.patchRows)
         for (std::vector<float>& b : image) b.resize(row);
-      column.inverseCount.resize(row);
+      for (std::vector<float>* b : {&column.inverseCount, &column.weight, &column.edge}) b->resize(row);
     }
-    for (std::vector<float>* b : {&difference_, &weight_, &edge_}) b->resize(row);
+    difference_.resize(row);
+    ofFirst_.reserve(columns_.size());
+    ofSecond_.reserve(columns_.size());
     startAtCentre();
   }
 
@@ -128,13 +140,11 @@ class TileFilter {
       const int y0 = std::max(target_.y0 - dy, 0), y1 = std::min(target_.y1, height_ - dy);
       if (y0 >= y1) continue;
       for (int dx = -kPatchWelchWindow; dx <= kPatchWelchWindow; ++dx) begin(dx, dy);
-      for (int y = y0 - 1; y <= y1; ++y)
-        for (int dx = -kPatchWelchWindow; dx <= kPatchWelchWindow; ++dx) {
-          Column& column = columnOf(dx);
-          if (column.p.empty()) continue;
-          patchRow(column, y, dx, dy);
-          if (y > y0) accumulate(column, y - 1, dx, dy);
-        }
+      for (int y = y0 - 1; y <= y1; ++y) {
+        for (int dx = -kPatchWelchWindow; dx <= kPatchWelchWindow; ++dx)
+          if (!columnOf(dx).p.empty()) patchRow(columnOf(dx), y, dx, dy);
+        if (y > y0) accumulate(y - 1, dy);
+      }
     }
   }
 
@@ -154,13 +164,14 @@ class TileFilter {
   }
 
  private:
+  // Rows of sums are whole vectors.
   ptrdiff_t sumIndex(int x, int y) const {
-    return static_cast<ptrdiff_t>(y - target_.y0) * target_.width() + (x - target_.x0);
+    return static_cast<ptrdiff_t>(y - target_.y0) * roundUp(target_.width()) + (x - target_.x0);
   }
 
   // The weight of a pixel with itself is 1.
   void startAtCentre() {
-    const auto area = static_cast<size_t>(target_.width()) * static_cast<size_t>(target_.height());
+    const auto area = static_cast<size_t>(roundUp(target_.width())) * static_cast<size_t>(target_.height());
     sums_.resize(thresholds_.size() * images_);
     for (size_t k = 0; k < sums_.size(); ++k) {
       sums_[k].plane[0].assign(area, 1.0f);
@@ -180,6 +191,10 @@ class TileFilter {
     float spatial = 0;
     std::array<std::array<std::vector<float>, 3>, PatchWelchInput::kMaxImages> patchRows;  // the last three
     std::vector<float> inverseCount;
+    // Of the row and image at hand, from the leftmost pixel on that a pair of the tile may have; zero where there is
+    // none.
+    std::vector<float> weight, edge;
+    bool edgeReady = false;
     float* patchRow(size_t image, int y) { return patchRows[image][static_cast<size_t>(y + 3) % 3].data(); }
   };
   Column& columnOf(int dx) { return columns_[static_cast<size_t>(dx + kPatchWelchWindow)]; }
@@ -192,6 +207,7 @@ class TileFilter {
     const PixelRect reach = {target_.x0 - std::max(dx, 0), target_.y0 - dy, target_.x1 + std::max(-dx, 0), target_.y1};
     column.pairs = pairsAt(dx, dy, width_, height_);
     column.p = intersection(reach, column.pairs);
+    std::fill(column.weight.begin(), column.weight.end(), 0.0f);
     for (int x = column.p.x0; x < column.p.x1; ++x)
       column.inverseCount[static_cast<size_t>(x - column.p.x0)] =
           1.0f / static_cast<float>(3 * patchCount(x, 1, column.pairs.x0, column.pairs.x1));
@@ -222,46 +238,61 @@ class TileFilter {
     }
   }
 
-  // Adds the pairs of row y to the sums of both pixels.
-  void accumulate(Column& column, int y, int dx, int dy) {
-    const PixelRect &p = column.p, &pairs = column.pairs;
-    const int count = roundUp(p.width());
-    const float inverseRows = 1.0f / static_cast<float>(patchCount(y, 1, pairs.y0, pairs.y1));
-    bool edgeReady = false;
+  // Adds the pairs of row y at all dx to the sums of both pixels.
+  void accumulate(int y, int dy) {
+    for (Column& column : columns_) column.edgeReady = false;
     for (size_t i = 0; i < images_; ++i)
       for (size_t k = 0; k < thresholds_.size(); ++k) {
-        const float scale = inverseRows / (thresholds_[k] * PatchWelchInput::varianceFactor(i));
-        if (!toleranceRow({column.patchRow(i, y - 1), column.patchRow(i, y), column.patchRow(i, y + 1)},
-                          column.inverseCount.data(), scale, count, weight_.data()))
-          continue;
-        if (!edgeReady)
-          edgeRow(tile_, tile_.index(p.x0, y), tile_.index(p.x0 + dx, y + dy), column.spatial, count, edge_.data());
-        edgeReady = true;
-        weightRow(weight_.data(), edge_.data(), count);
-        addToBoth(p, y, dx, dy, tile_.radiance[i], sums_[k * images_ + i]);
+        ofFirst_.clear();
+        ofSecond_.clear();
+        for (int dx = -kPatchWelchWindow; dx <= kPatchWelchWindow; ++dx)
+          if (!columnOf(dx).p.empty() && weigh(columnOf(dx), y, dx, dy, i, thresholds_[k]))
+            listRows(columnOf(dx), y, dx, dy, tile_.radiance[i]);
+        Sums& sums = sums_[k * images_ + i];
+        const int count = roundUp(target_.width());
+        if (y >= target_.y0) addRows(ofFirst_, count, sums, sumIndex(target_.x0, y));
+        if (y + dy < target_.y1) addRows(ofSecond_, count, sums, sumIndex(target_.x0, y + dy));
       }
   }
 
-  void addToBoth(const PixelRect& p, int y, int dx, int dy, const PatchWelchTile::Plane3& u, Sums& sums) {
-    const int x0 = std::max(p.x0, target_.x0), x1 = std::min(p.x1, target_.x1);  // pixels p in the tile
-    if (y >= target_.y0 && x0 < x1)
-      accumulateRow(weight_.data() + (x0 - p.x0), rowsAt(u, tile_.index(x0 + dx, y + dy)), x1 - x0, sums,
-                    sumIndex(x0, y));
-    const int q0 = std::max(p.x0 + dx, target_.x0), q1 = std::min(p.x1 + dx, target_.x1);  // pixels q in the tile
-    if (y + dy < target_.y1 && q0 < q1)
-      accumulateRow(weight_.data() + (q0 - dx - p.x0), rowsAt(u, tile_.index(q0 - dx, y)), q1 - q0, sums,
-                    sumIndex(q0, y + dy));
+  // Row y of the weights of an image; whether any is positive.
+  bool weigh(Column& column, int y, int dx, int dy, size_t image, float squaredThreshold) {
+    const PixelRect &p = column.p, &pairs = column.pairs;
+    const int count = roundUp(p.width());
+    const float inverseRows = 1.0f / static_cast<float>(patchCount(y, 1, pairs.y0, pairs.y1));
+    const float scale = inverseRows / (squaredThreshold * PatchWelchInput::varianceFactor(image));
+    float* weight = column.weight.data() + weightIndex(p.x0);
+    if (!toleranceRow({column.patchRow(image, y - 1), column.patchRow(image, y), column.patchRow(image, y + 1)},
+                      column.inverseCount.data(), scale, count, weight))
+      return false;
+    if (!column.edgeReady)
+      edgeRow(tile_, tile_.index(p.x0, y), tile_.index(p.x0 + dx, y + dy), column.spatial, count, column.edge.data());
+    column.edgeReady = true;
+    weightRow(weight, column.edge.data(), count);
+    std::fill(weight + p.width(), weight + count, 0.0f);
+    return true;
   }
+
+  // The weights of a dx add q to the sums of p, and p to those of q.
+  void listRows(const Column& column, int y, int dx, int dy, const PatchWelchTile::Plane3& u) {
+    const float* weight = column.weight.data();
+    ofFirst_.push_back({weight + weightIndex(target_.x0), rowsAt(u, tile_.index(target_.x0 + dx, y + dy))});
+    ofSecond_.push_back({weight + weightIndex(target_.x0 - dx), rowsAt(u, tile_.index(target_.x0 - dx, y))});
+  }
+
+  ptrdiff_t weightIndex(int x) const { return x - (target_.x0 - kPatchWelchWindow); }
 
   PixelRect target_;
   int width_, height_;  // of the image
   const std::vector<float>& thresholds_;
   PatchWelchTile tile_;
   size_t images_;
+  int row_;                 // floats of a row of any buffer
   std::vector<Sums> sums_;  // [threshold][image]
   std::array<std::vector<float>, 3> inverse_;
   std::array<Column, 2 * kPatchWelchWindow + 1> columns_;  // by dx
-  std::vector<float> difference_, weight_, edge_;
+  std::vector<float> difference_;
+  std::vector<WeightedRow> ofFirst_, ofSecond_;  // what is added to the sums of p, and of q
 };
 
 }  // namespace

@@ -74,7 +74,7 @@ PatchWelchInput patchWelchInput(const Estimate& estimate, const Features* featur
 PatchWelchTile::PatchWelchTile(const PatchWelchInput& input, const PixelRect& pixels)
     : rect(pixels), pitch(pixels.width() + kPadding), radiance(input.images.size()) {
   BRAID_ASSERT(!input.variance.empty() && input.variance.size() == input.images[0]->size());
-  const auto size = static_cast<size_t>(pitch) * static_cast<size_t>(rect.height() + 1);
+  const auto size = static_cast<size_t>(pitch) * static_cast<size_t>(rect.height());
   for (Plane3& image : radiance)
     for (std::vector<float>& plane : image) plane.assign(size, 0.0f);
   for (std::vector<float>& plane : variance) plane.assign(size, 0.0f);

@@ -35,9 +35,9 @@ struct PatchWelchInput {
 PatchWelchInput patchWelchInput(const Estimate& estimate, const Features* features, bool robustVariance = false);
 
 // Contiguous copies of the pixels of a rectangle. Non-finite values are zero. Rows are padded so that whole vectors
-// may be read past their ends.
+// may be read before their beginnings and past their ends, by up to half the padding.
 struct PatchWelchTile {
-  static constexpr int kPadding = 32;
+  static constexpr int kPadding = 64;
   static constexpr size_t kGuides = 6;
   using Plane3 = std::array<std::vector<float>, 3>;
 
@@ -52,7 +52,9 @@ struct PatchWelchTile {
   std::vector<float> depth, visibility;  // depth in units of the mean depth; zero without features
 
   PatchWelchTile(const PatchWelchInput& input, const PixelRect& pixels);
-  ptrdiff_t index(int x, int y) const { return static_cast<ptrdiff_t>(y - rect.y0) * pitch + (x - rect.x0); }
+  ptrdiff_t index(int x, int y) const {
+    return static_cast<ptrdiff_t>(y - rect.y0) * pitch + (x - rect.x0) + kPadding / 2;
+  }
 
  private:
   void storeFeatures(const Features& features, float depthScale, size_t from, size_t at);  // of a row
