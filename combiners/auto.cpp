@@ -174,7 +174,7 @@ MethodResult Auto::run(const MethodInputs& in) const {
   for (const Estimate& e : shrunk) candidates.push_back(&e);
   for (const Estimate& e : bases) candidates.push_back(&e);
   const int patchRadius = static_cast<int>(std::clamp(in.options.number(kPatch), 1.0, 101.0)) / 2;
-  const WeightMaps weights = relativeWeights(x, candidates, variance, in.features, patchRadius);
+  const WeightMaps weights = relativeWeights(x, candidates, bases.back().mean, variance, in.features, patchRadius);
   if (cancelled()) return result;
   result.image = weightedEstimate(weights, candidates);
   if (in.options.number(kDespike) != 0) removeSpikes(result, x, variance, in.features);

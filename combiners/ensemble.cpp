@@ -24,7 +24,7 @@ const OptionInfo kFullError{"ensemble-full-error", 0, "1: errors of the whole im
 
 const OptionInfo kRelative{
     "ensemble-relative", 1,
-    "1: errors relative to the brightness of the first base, as relL2 counts them; 0: the paper's"};
+    "1: errors relative to the brightness of the unbiased image, as relL2 counts them; 0: the paper's"};
 
 // Fewer passes leave too few in each half to tell the bases apart.
 constexpr uint64_t kFewestPasses = 8;
@@ -72,7 +72,7 @@ MethodResult Ensemble::run(const MethodInputs& in) const {
   EnsembleChoices choices = choicesOf(in.options);
   Plane<float> roots;
   if (in.options.number(kRelative) != 0) {
-    roots = relativeErrorRoots(in.bases.front()->mean, meanVariance(*in.unbiased));
+    roots = relativeErrorRoots(in.unbiased->mean, meanVariance(*in.unbiased));
     choices.rootWeights = &roots;
   }
   const uint64_t passes = in.unbiased->passes;

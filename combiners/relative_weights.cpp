@@ -21,21 +21,23 @@ constexpr double kImprovement = 1e-5;  // weights to 1e-9 of the error change no
 }  // namespace
 
 Plane<float> relativeErrorRoots(const Rgb<float>& guide, const Rgb<float>& variance) {
-  const Plane<double> level =
-      boxMean(channelMean(guide, [&](size_t i, size_t c) { return static_cast<double>(guide[c][i]); }), 1);
+  const Plane<float> own = channelMean(guide, [&](size_t i, size_t c) { return static_cast<double>(guide[c][i]); });
+  const Plane<double> around = boxMean(own, 1);
   const Plane<float> noise =
       channelMean(variance, [&](size_t i, size_t c) { return static_cast<double>(variance[c][i]); });
   Plane<float> out(guide.width(), guide.height());
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i)
-      out[i] = finiteFloat(1 / std::sqrt(level[i] * level[i] + 0.01 + kVarianceShare * static_cast<double>(noise[i])));
+    for (size_t i = begin; i < end; ++i) {
+      const double level = 0.5 * (static_cast<double>(own[i]) + around[i]);
+      out[i] = finiteFloat(1 / std::sqrt(level * level + 0.01 + kVarianceShare * static_cast<double>(noise[i])));
+    }
   });
   return out;
 }
 
-WeightMaps relativeWeights(const Estimate& x, const std::vector<const Estimate*>& candidates,
+WeightMaps relativeWeights(const Estimate& x, const std::vector<const Estimate*>& candidates, const Rgb<float>& guide,
                            const Rgb<float>& variance, const Features* features, int patchRadius) {
-  const Plane<float> roots = relativeErrorRoots(candidates.back()->mean, variance);
+  const Plane<float> roots = relativeErrorRoots(guide, variance);
   EnsembleChoices choices;
   choices.patchRadius = patchRadius;
   choices.rootWeights = &roots;

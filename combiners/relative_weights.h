@@ -7,15 +7,16 @@
 
 namespace braid {
 
-// Roots of the weights of pixels that make their errors relative, 1 / sqrt(mean² + 0.01 + 0.3 v): of the 3x3 mean of
-// the guide, and with a share of the variance v. Without any, single outliers decide; with all of it, filters that keep
+// Roots of the weights of pixels that make their errors relative, 1 / sqrt(level² + 0.01 + 0.3 v). The level is half
+// the guide's own and half its 3x3 mean: the mean alone hides what a lamp's neighbours get wrong, and without it noise
+// of the guide counts. Without any share of the variance v, single outliers decide; with all of it, filters that keep
 // outliers go unpunished.
 Plane<float> relativeErrorRoots(const Rgb<float>& guide, const Rgb<float>& variance);
 
-// Weights of the candidates, the last of which tells the brightness: shared by the channels, summed over patches of
-// (2 patchRadius + 1)² pixels, solved for blocks of 2x2 pixels and smoothed along surfaces. `variance` is that of the
-// mean of x. All images have halves; the features may be absent.
-WeightMaps relativeWeights(const Estimate& x, const std::vector<const Estimate*>& candidates,
+// Weights of the candidates by errors relative to the brightness of `guide`: shared by the channels, summed over
+// patches of (2 patchRadius + 1)² pixels, solved for blocks of 2x2 pixels and smoothed along surfaces. `variance` is
+// that of the mean of x. All images have halves; the features may be absent.
+WeightMaps relativeWeights(const Estimate& x, const std::vector<const Estimate*>& candidates, const Rgb<float>& guide,
                            const Rgb<float>& variance, const Features* features, int patchRadius);
 
 }  // namespace braid

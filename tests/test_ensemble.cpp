@@ -346,7 +346,7 @@ TEST_CASE("Relative errors: the scale of a pixel, and no bright pixel decides fo
   for (size_t ch = 0; ch < 3; ++ch) guide[ch].at(1, 0) = 2;
   const Plane<float> roots = relativeErrorRoots(guide, variance);
   CHECK(roots.at(4, 3) == doctest::Approx(1 / std::sqrt(0.25 + 0.01 + 0.3 * 0.2)));
-  const double level = (5 * 0.5 + 2) / 6;  // 3x2 pixels at the border
+  const double level = 0.5 * (2 + (5 * 0.5 + 2) / 6);  // its own and that of 3x2 pixels at the border
   CHECK(roots.at(1, 0) == doctest::Approx(1 / std::sqrt(level * level + 0.01 + 0.3 * 0.2)));
 
   // One base is right but for a lamp of 3x3 pixels, the other about the lamp only. Three of its pixels are in the
