@@ -8,6 +8,7 @@
 #include "combiners/denoise/window.h"
 #include "combiners/finite_float.h"
 #include "combiners/mirror.h"
+#include "renderer/core/error.h"
 
 namespace braid {
 
@@ -89,8 +90,9 @@ double total(const Plane<double>& in) {
   });
 }
 
-// The mean factor of every pixel of one channel.
-Plane<double> factors(const Plane<double>& squares, const Plane<double>& variance, const JamesSteinSettings& s) {
+// The mean factor of every pixel of one channel; those of blocks are not below `least`, if any.
+Plane<double> factors(const Plane<double>& squares, const Plane<double>& variance, const JamesSteinSettings& s,
+                      const Plane<double>* least) {
   if (s.global) {
     const auto n = static_cast<double>(squares.size());
     const double numerator = s.constant * std::max(0.0, n - 2) / n * total(variance);
@@ -101,6 +103,7 @@ Plane<double> factors(const Plane<double>& squares, const Plane<double>& varianc
   Plane<double> factor = mirrorBoxMean(squares, s.radius);
   forAll(factor.size(),
          [&](size_t i) { factor[i] = shrinkageFactor(s.constant * numerator[i], p * factor[i], s.positivePart); });
+  if (least) forAll(factor.size(), [&](size_t i) { factor[i] = std::max(factor[i], (*least)[i]); });
   return mirrorBoxMean(factor, s.radius);
 }
 
@@ -122,13 +125,6 @@ Plane<float> gates(const Rgb<float>& variance, int radius) {
     deviation[i] = own > 5 * around[i] * around[i] ? finiteFloat(sqr(3 * own)) : 0.0f;
   });
   return deviation;
-}
-
-bool gated(const NoiseScale& scale, const Rgb<float>& x, const Rgb<float>& y, size_t i) {
-  if (scale.gate.empty() || scale.gate[i] <= 0) return false;
-  double square = 0;
-  for (size_t c = 0; c < 3; ++c) square += sqr(static_cast<double>(x[c][i]) - static_cast<double>(y[c][i])) / 3;
-  return square < static_cast<double>(scale.gate[i]);
 }
 
 // The squared differences of X and Y and the variance of X, in units of the scale: what the factors are made of.
@@ -162,7 +158,7 @@ Terms termsOf(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale&
       });
     }
     for (size_t i = begin; i < end; ++i)
-      if (gated(scale, x, y, i)) out.squares[i] = out.noise[i] = 0;
+      if (isLoneOutlier(scale.gate, x, y, i)) out.squares[i] = out.noise[i] = 0;
   });
   return out;
 }
@@ -199,22 +195,30 @@ NoiseScale noiseScale(const Rgb<float>& variance, const JamesSteinSettings& sett
   return scale;
 }
 
+bool isLoneOutlier(const Plane<float>& gate, const Rgb<float>& x, const Rgb<float>& y, size_t i) {
+  if (gate.empty() || gate[i] <= 0) return false;
+  double square = 0;
+  for (size_t c = 0; c < 3; ++c) square += sqr(static_cast<double>(x[c][i]) - static_cast<double>(y[c][i])) / 3;
+  return square < static_cast<double>(gate[i]);
+}
+
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rgb<float>& y,
                        const JamesSteinSettings& settings) {
   return jamesStein(x, variance, noiseScale(variance, settings), y, settings);
 }
 
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale& scale, const Rgb<float>& y,
-                       const JamesSteinSettings& settings) {
+                       const JamesSteinSettings& settings, const std::array<Plane<double>, 3>* least) {
+  BRAID_ASSERT(!least || !settings.global);
   ShrunkImage out;
   out.image = Rgb<float>(x.width(), x.height());
   const size_t together = settings.shared ? 3 : 1;
   for (size_t first = 0; first < 3; first += together) {
     const Terms terms = termsOf(x, variance, scale, y, first, together);
-    Plane<double> factor = factors(terms.squares, terms.noise, settings);
+    Plane<double> factor = factors(terms.squares, terms.noise, settings, least ? &(*least)[first] : nullptr);
     parallelChunks(x.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i)
-        if (gated(scale, x, y, i)) factor[i] = 0;
+        if (isLoneOutlier(scale.gate, x, y, i)) factor[i] = 0;
       for (size_t c = first; c < first + together; ++c)
         runVectorised([&] { blendRow(&x[c][begin], &y[c][begin], &factor[begin], end - begin, &out.image[c][begin]); });
     });

@@ -51,6 +51,9 @@ struct NoiseScale {
 };
 NoiseScale noiseScale(const Rgb<float>& variance, const JamesSteinSettings& settings);
 
+// Whether pixel i is a lone outlier of x that does not contradict y; `gate` is that of the noise of x, or empty.
+bool isLoneOutlier(const Plane<float>& gate, const Rgb<float>& x, const Rgb<float>& y, size_t i);
+
 struct ShrunkImage {
   Rgb<float> image;
   Rgb<float> factor;  // mean factor of every pixel and channel: 1 is all X, 0 all Y; or empty
@@ -59,8 +62,9 @@ struct ShrunkImage {
 // x, y: images; variance: of the mean of x, >= 0. All of one size.
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rgb<float>& y,
                        const JamesSteinSettings& settings);
-// The same with the scale of these settings and this variance.
+// The same with the scale of these settings and this variance. The factors of blocks are not below `least`, by channel;
+// null: 0. It must be null for one factor for the whole image.
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale& scale, const Rgb<float>& y,
-                       const JamesSteinSettings& settings);
+                       const JamesSteinSettings& settings, const std::array<Plane<double>, 3>* least = nullptr);
 
 }  // namespace braid
