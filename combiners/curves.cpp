@@ -9,6 +9,11 @@
 //
 // Earlier variances are filtered with the width of the newest, so that the curve of a pixel describes one region.
 //
+// Lone outliers of the noisy image that do not contradict the denoised one are replaced by it whole (curves-gate; the
+// paper keeps 1 / (1 + 64) of them at least): over 14 scenes at 16 to 256 samples, with nfor, the error is 1.09 of that
+// of the better input instead of 1.63, and below it in 25 cases of 42 instead of 11. Their noise falls as 1/I like all,
+// and then they contradict any image that is wrong.
+//
 // Denoising may stop at some number of passes (in.stopped): d and its error are then those of the noisy image of that
 // time, with the features of now, while n and the curve are the newest. W never exceeds its value at the stop, so that
 // the share of d goes to 0 and the image converges like the noisy one. Variances of later passes may lower W; to let it
@@ -22,6 +27,7 @@
 #include "combiners/denoise/variance.h"
 #include "combiners/finite_float.h"
 #include "combiners/registry.h"
+#include "combiners/shrinkage.h"
 #include "combiners/sure_map.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
@@ -34,6 +40,7 @@ const OptionInfo kStep{"curves-step", 0.1, "Perturbation of the risk estimate in
 const OptionInfo kSlope{"curves-fallback-slope", -2, "Slope of pixels without a curve; -2: the paper, -1: theory"};
 const OptionInfo kPoints{"curves-points", 4, "Most points of a curve, 2 to 8; fewer: all pixels take the fallback"};
 const OptionInfo kMost{"curves-most", 65536, "Most passes that a denoised pixel counts"};
+const OptionInfo kGate{"curves-gate", 1, "1: lone outliers of the noisy image do not count; 0: the paper"};
 const OptionInfo kMostRatio{"curves-most-ratio", 64, "Most passes that it counts, per pass of the noisy image"};
 
 // Before, variances are too uncertain for a curve.
@@ -54,10 +61,12 @@ class Curves : public StoppingMethod {
     return needs;
   }
   MethodMemory memory(const MemoryCase& of) const override {
-    if (of.passes > 0 && of.passes < 4) return {84, 44};
-    return {120, 44, 0, 36};
+    if (of.passes > 0 && of.passes < 4) return {90, 44};
+    return {123, 44, 0, 36};
   }
-  std::vector<OptionInfo> options() const override { return {kStep, kSlope, kPoints, kMost, kMostRatio, kCurvesStop}; }
+  std::vector<OptionInfo> options() const override {
+    return {kStep, kSlope, kPoints, kMost, kMostRatio, kCurvesStop, kGate};
+  }
   uint64_t stop() const override { return stop_; }
   std::unique_ptr<Method> stoppedAfter(uint64_t passes) const override {
     return std::make_unique<Curves>(stopPasses(static_cast<double>(passes)));
@@ -140,6 +149,13 @@ Plane<float> weightsOf(const Variances& v, const Rgb<float>& error, size_t c, co
   return out;
 }
 
+// Where single samples of n say nothing; empty where that is not asked for.
+Plane<float> gateOf(const Rgb<float>& variance, const MethodOptions& options) {
+  JamesSteinSettings settings;
+  settings.gate = options.number(kGate) != 0;
+  return noiseScale(variance, settings).gate;
+}
+
 void limitTo(Plane<float>& plane, const Plane<float>& most) {
   for (size_t i = 0; i < plane.size(); ++i) plane[i] = std::min(plane[i], most[i]);
 }
@@ -169,12 +185,14 @@ MethodResult Curves::run(const MethodInputs& in) const {
   if (halves) result.image.half[0] = result.image.half[1] = Rgb<float>(width, height);
   result.error = Plane<float>(width, height);
   Plane<float> share(width, height);
+  const Plane<float> gate = gateOf(n.variance, in.options);
   for (size_t c = 0; c < 3; ++c) {
     Plane<float> weight = weightsOf(now, error, c, in.options, points);
     if (in.stopped) limitTo(weight, weightsOf(atStop, error, c, in.options, points));
     parallelChunks(weight.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
-        const double w = static_cast<double>(weight[i]), a = w / (now.passes + w);
+        const double w = static_cast<double>(weight[i]);
+        const double a = isLoneOutlier(gate, n.mean, d.mean, i) ? 1.0 : w / (now.passes + w);
         const auto blend = [a](float x, float y) {
           return finiteFloat((1 - a) * static_cast<double>(x) + a * static_cast<double>(y));
         };

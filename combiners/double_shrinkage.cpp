@@ -3,6 +3,11 @@
 // unbiased image, a biased one (a photon map's or a denoiser's) and a smooth prior fitted to both; all squared errors
 // are estimated from variances and halves.
 //
+// Lone outliers of X_u that do not contradict X_b are replaced by it first (double-shrinkage-gate; not in the paper),
+// and their variance, of more than 5 deviations around, counts as 1/25: with all of it X_u would be given up for a
+// whole window, and with nothing what other pixels have not met yet would be forgotten. With sppm on the six scenes
+// that have photon maps, at 8 to 256 samples, the error falls from 1.23 of that of js to 0.78.
+//
 // Halves of the result: the half h combines X_u^h, X_b^h and the prior of half h with the weights of the result, like
 // the halves of an ensemble: the weights have seen both halves. The error map is measured across the halves of the
 // result; the variance of the posterior, its alternative without halves, is too small wherever an outlier lowered eta².
@@ -19,6 +24,7 @@
 #include "combiners/radiance_prior.h"
 #include "combiners/regression_features.h"
 #include "combiners/registry.h"
+#include "combiners/shrinkage.h"
 #include "renderer/core/parallel.h"
 
 namespace braid {
@@ -31,6 +37,9 @@ const OptionInfo kStride{"double-shrinkage-stride", 4, "Distance of the regressi
 
 const OptionInfo kOwnHalves{"double-shrinkage-own-halves", 0,
                             "1: fit the priors of the halves by their own samples alone, at three times the cost"};
+
+const OptionInfo kGate{"double-shrinkage-gate", 1,
+                       "1: replace lone outliers of the unbiased image first; 0: the paper"};
 
 constexpr int kRadius = 6;  // of the filter of the biased image's variance
 
@@ -118,6 +127,29 @@ Prior makePrior(const MethodInputs& in, const Rgb<float>& variance, const Rgb<fl
   return prior;
 }
 
+constexpr float kOutlierVariance = 1.0f / 25;  // of the variance of an outlier that was replaced
+
+// The mean and the halves of x without its lone outliers, whose variance is lowered.
+Estimate withoutOutliers(const Estimate& x, const Estimate& y, Rgb<float>& variance) {
+  JamesSteinSettings settings;
+  settings.gate = true;
+  const Plane<float> gate = noiseScale(variance, settings).gate;
+  Estimate out;
+  out.name = x.name;
+  out.passes = x.passes;
+  out.mean = x.mean;
+  for (int h = 0; h < 2; ++h) out.half[h] = x.half[h];
+  for (size_t i = 0; i < gate.size(); ++i) {
+    if (!isLoneOutlier(gate, x.mean, y.mean, i)) continue;
+    for (size_t c = 0; c < 3; ++c) {
+      out.mean[c][i] = y.mean[c][i];
+      for (int h = 0; h < 2; ++h) out.half[h][c][i] = y.half[h][c][i];
+      variance[c][i] *= kOutlierVariance;
+    }
+  }
+  return out;
+}
+
 class DoubleShrinkageMethod : public Method {
  public:
   const char* name() const override { return "double-shrinkage"; }
@@ -132,8 +164,8 @@ class DoubleShrinkageMethod : public Method {
     needs.passes = 4;
     return needs;
   }
-  MethodMemory memory(const MemoryCase& /*of*/) const override { return {268, 72}; }
-  std::vector<OptionInfo> options() const override { return {kPrior, kStage, kStride, kOwnHalves}; }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {284, 72}; }
+  std::vector<OptionInfo> options() const override { return {kPrior, kStage, kStride, kOwnHalves, kGate}; }
   MethodResult run(const MethodInputs& in) const override;
 };
 
@@ -155,13 +187,20 @@ struct Maps {
   }
 };
 
-MethodResult DoubleShrinkageMethod::run(const MethodInputs& in) const {
-  const Estimate &x = *in.unbiased, &y = *in.biased;
+MethodResult DoubleShrinkageMethod::run(const MethodInputs& given) const {
+  const Estimate& y = *given.biased;
+  Rgb<float> variance = meanVariance(*given.unbiased);
+  MethodInputs in = given;
+  Estimate clean;
+  if (in.options.number(kGate) != 0 && hasHalves(*given.unbiased) && hasHalves(y)) {
+    clean = withoutOutliers(*given.unbiased, y, variance);
+    in.unbiased = &clean;
+  }
+  const Estimate& x = *in.unbiased;
   MethodResult result;
   Estimate& out = result.image;
   out.unbiased = false;
   out.passes = x.passes;
-  const Rgb<float> variance = meanVariance(x);
   const bool halves = hasHalves(x) && hasHalves(y);
   Plane<float> errorU = unbiasedError(x, variance), errorB = biasedError(y, x, variance, in.features), errorP;
   Maps maps(errorU, errorB, errorP);
@@ -187,7 +226,8 @@ MethodResult DoubleShrinkageMethod::run(const MethodInputs& in) const {
   result.aovs.push_back({"kappa2.double-shrinkage", std::move(maps.toPrior)});
   result.aovs.push_back({"error-unbiased.double-shrinkage", std::move(errorU)});
   result.aovs.push_back({"error-biased.double-shrinkage", std::move(errorB)});
-  result.error = halves ? errorMap(out.half, x, variance, y.mean) : std::move(maps.variance);
+  result.error =
+      halves ? errorMap(out.half, *given.unbiased, meanVariance(*given.unbiased), y.mean) : std::move(maps.variance);
   return result;
 }
 

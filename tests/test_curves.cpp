@@ -258,3 +258,22 @@ TEST_CASE("The risk estimate probes with the deviation of the pixel, so it scale
     CHECK(std::fabs(estimated - sum) < 4 * std::sqrt(square));
   }
 }
+
+TEST_CASE("A lone outlier is replaced by the denoised image, unless it contradicts that") {
+  CaseOptions o;
+  o.samples = 64;
+  Case c = makeCase(o);
+  Estimate& n = c.estimates.estimates[0];
+  const int x = 20, y = 14;
+  for (size_t ch = 0; ch < 3; ++ch) {
+    n.mean[ch].at(x, y) = 50;
+    n.variance[ch].at(x, y) = 50 * 50;
+  }
+  MethodInputs in = inputsOf(c, "narrow");
+  in.redenoise = [](const Rgb<float>& image) { return image; };
+  const float denoised = in.biased->mean[0].at(x, y);
+  CHECK(run(in).image.mean[0].at(x, y) == denoised);
+  CHECK(run(in, {{"gate", 0}}).image.mean[0].at(x, y) > denoised + 0.1f);
+  for (size_t ch = 0; ch < 3; ++ch) n.variance[ch].at(x, y) = 10 * 10;  // five deviations: not chance
+  CHECK(run(in).image.mean[0].at(x, y) > denoised + 0.1f);
+}

@@ -438,3 +438,22 @@ TEST_CASE("The number of threads changes no bit of double shrinkage") {
     CHECK(identical(results[0].error, results[i].error));
   }
 }
+
+TEST_CASE("Lone outliers of the unbiased image neither stay nor take their surroundings from it") {
+  Case c = makeCase(sized(64, 48, 64));
+  const Case without = c;
+  Estimate& x = c.estimates.estimates[0];
+  for (size_t ch = 0; ch < 3; ++ch) {
+    x.mean[ch].at(20, 14) = 50;
+    x.half[0][ch].at(20, 14) = 100;
+    x.variance[ch].at(20, 14) = 50 * 50;
+  }
+  const double clean = meanSquaredError(runDouble(without, "sppm").image.mean, c.truth);
+  const double gated = meanSquaredError(runDouble(c, "sppm").image.mean, c.truth);
+  const double paper = meanSquaredError(runDouble(c, "sppm", {{"gate", 0}}).image.mean, c.truth);
+  CAPTURE(clean);
+  CAPTURE(gated);
+  CAPTURE(paper);
+  CHECK(gated < 1.2 * clean);
+  CHECK(paper > 1.5 * gated);
+}
