@@ -67,20 +67,24 @@ MethodMemory Auto::memory(const MemoryCase& of) const {
   return {114 + 80 * bases + fused, 40 + 8 * bases};
 }
 
-// The filters of x: a wide one, from 64 passes on its first-order fit, and last a careful one that takes no neighbour's
-// noise for its own.
+// The filters of x, fewer once cancelled: a wide one, from 64 passes on its first-order fit, and last a careful one
+// that takes no neighbour's noise for its own.
 std::vector<Estimate> filtersOf(const Estimate& x, const Features* features, const std::atomic<bool>* cancel) {
-  const PatchWelchInput input = patchWelchInput(x, features);
+  const auto cancelled = [&] { return cancel && cancel->load(); };
   std::vector<Estimate> bases;
+  if (cancelled()) return bases;
+  const PatchWelchInput input = patchWelchInput(x, features);
   if (input.variance.empty()) return bases;
   if (x.passes > 0 && x.passes < kFewestPasses) {
     bases.push_back(asEstimate(std::move(patchWelch(input, std::array{kPatchWelchThreshold}, {}, cancel)[0]), "pw"));
     return bases;
   }
   auto wide = patchWelch(input, std::array{kPatchWelchWideThreshold}, {}, cancel);
+  if (cancelled()) return bases;
   if (x.passes >= kFirstOrderPasses)
     bases.push_back(asEstimate(patchWelchFirstOrder(input, wide[0], {}, cancel), "pw1"));
   bases.push_back(asEstimate(std::move(wide[0]), "pw-wide"));
+  if (cancelled()) return bases;
   const PatchWelchInput robust = patchWelchInput(x, features, true);
   auto careful = patchWelch(robust, std::array{kPatchWelchThreshold}, {}, cancel);
   bases.push_back(asEstimate(std::move(careful[0]), "pw-robust"));
@@ -160,12 +164,12 @@ MethodResult Auto::run(const MethodInputs& in) const {
   std::vector<Estimate> bases;
   for (const Estimate* b : others) bases.push_back(consistentHalves(baseOf(*b, x, !photonMaps.empty(), in)));
   for (Estimate& e : filtersOf(x, in.features, in.cancel)) bases.push_back(std::move(e));
+  const auto cancelled = [&] { return in.cancel && in.cancel->load(); };
+  if (cancelled()) return result;
   if (bases.empty() || (x.passes > 0 && x.passes < kFewestPasses)) {  // nothing can be measured across halves
     result.image = bases.empty() ? x : std::move(bases.back());
     return result;
   }
-  const auto cancelled = [&] { return in.cancel && in.cancel->load(); };
-  if (cancelled()) return result;
   const Rgb<float> variance = meanVariance(x);
   std::vector<Estimate> shrunk;
   if (in.options.number(kShrink) != 0) shrunk = shrunkTowards(bases, x, variance, in.cancel);
