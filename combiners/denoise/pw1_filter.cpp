@@ -40,11 +40,8 @@ struct alignas(64) Windowed {
 // Sums over the window are kept in so many lanes whatever the instruction set, for the same bits everywhere.
 using Unit = float __attribute__((vector_size(kUnit * sizeof(float))));
 
-Unit unitAt(const float* p) {
-  Unit out;
-  std::memcpy(&out, p, sizeof(out));
-  return out;
-}
+// By reference: a vector that is returned would take another way in each instruction set.
+void load(const float* p, Unit& out) { std::memcpy(&out, p, sizeof(out)); }
 
 double sumOf(const Unit& lanes) {
   double sum = 0;
@@ -58,9 +55,18 @@ void momentsOfRow(const std::array<Windowed, kColumns>& columns, const Windowed&
                   const std::array<const float*, 3>& u, NormalEquations& out) {
   Unit products[kRow + 1] = {}, rhs[3] = {};
   for (int i = 0; i < kCount; i += kUnit) {
-    const Unit wx = unitAt(weights.v + i) * unitAt(columns[kRow].v + i);
-    for (int k = 0; k <= kRow; ++k) products[k] += wx * unitAt(columns[static_cast<size_t>(k)].v + i);
-    for (size_t c = 0; c < 3; ++c) rhs[c] += wx * unitAt(u[c] + i);
+    Unit wx, x;
+    load(weights.v + i, wx);
+    load(columns[kRow].v + i, x);
+    wx *= x;
+    for (int k = 0; k <= kRow; ++k) {
+      load(columns[static_cast<size_t>(k)].v + i, x);
+      products[k] += wx * x;
+    }
+    for (size_t c = 0; c < 3; ++c) {
+      load(u[c] + i, x);
+      rhs[c] += wx * x;
+    }
   }
   for (int k = 0; k <= kRow; ++k) out.matrix[kRow][static_cast<size_t>(k)] = sumOf(products[k]);
   for (size_t c = 0; c < 3; ++c) out.rhs[kRow][c] = sumOf(rhs[c]);
@@ -80,11 +86,16 @@ void squaredDifferences(const std::vector<std::array<Bordered, 3>>& radiance, co
     Unit sum[kImages] = {};
     for (const PatchShift& shift : shifts)
       for (size_t c = 0; c < 3; ++c) {
-        const Unit v = variance[c].v[shift.centre] + unitAt(variance[c].v + shift.window + i);
-        Unit inverse = 1.0f / (v + kPatchWelchEpsilon);
-        if (kClipped) inverse = unitAt(inside.v + shift.window + i) > 0 ? inverse : Unit{};
+        Unit v, within, value;
+        load(variance[c].v + shift.window + i, v);
+        Unit inverse = 1.0f / ((variance[c].v[shift.centre] + v) + kPatchWelchEpsilon);
+        if (kClipped) {
+          load(inside.v + shift.window + i, within);
+          inverse = within > 0 ? inverse : Unit{};
+        }
         for (size_t k = 0; k < kImages; ++k) {
-          const Unit d = radiance[k][c].v[shift.centre] - unitAt(radiance[k][c].v + shift.window + i);
+          load(radiance[k][c].v + shift.window + i, value);
+          const Unit d = radiance[k][c].v[shift.centre] - value;
           sum[k] += d * d * inverse;
         }
       }
@@ -138,8 +149,11 @@ void predict(const std::array<Windowed, kColumns>& columns, const NormalSolution
   float coefficients[kColumns];
   for (size_t k = 0; k < kColumns; ++k) coefficients[k] = static_cast<float>(solution.coefficients[k][channel]);
   for (int i = 0; i < kCount; i += kUnit) {
-    Unit sum = coefficients[0] - Unit{};
-    for (size_t k = 1; k < kColumns; ++k) sum += coefficients[k] * unitAt(columns[k].v + i);
+    Unit sum = coefficients[0] - Unit{}, x;
+    for (size_t k = 1; k < kColumns; ++k) {
+      load(columns[k].v + i, x);
+      sum += coefficients[k] * x;
+    }
     std::memcpy(out + i, &sum, sizeof(sum));
   }
 }
