@@ -46,6 +46,7 @@ const OptionInfo kMostRatio{"curves-most-ratio", 64, "Most passes that it counts
 // Before, variances are too uncertain for a curve.
 constexpr double kFewestPasses = 16;
 constexpr double kRelativeEpsilon = 1e-6;
+constexpr int kGateRadius = 7;
 
 class Curves : public StoppingMethod {
  public:
@@ -149,13 +150,6 @@ Plane<float> weightsOf(const Variances& v, const Rgb<float>& error, size_t c, co
   return out;
 }
 
-// Where single samples of n say nothing; empty where that is not asked for.
-Plane<float> gateOf(const Rgb<float>& variance, const MethodOptions& options) {
-  JamesSteinSettings settings;
-  settings.gate = options.number(kGate) != 0;
-  return noiseScale(variance, settings).gate;
-}
-
 void limitTo(Plane<float>& plane, const Plane<float>& most) {
   for (size_t i = 0; i < plane.size(); ++i) plane[i] = std::min(plane[i], most[i]);
 }
@@ -185,7 +179,7 @@ MethodResult Curves::run(const MethodInputs& in) const {
   if (halves) result.image.half[0] = result.image.half[1] = Rgb<float>(width, height);
   result.error = Plane<float>(width, height);
   Plane<float> share(width, height);
-  const Plane<float> gate = gateOf(n.variance, in.options);
+  const Plane<float> gate = in.options.number(kGate) != 0 ? outlierGate(n.variance, kGateRadius) : Plane<float>();
   for (size_t c = 0; c < 3; ++c) {
     Plane<float> weight = weightsOf(now, error, c, in.options, points);
     if (in.stopped) limitTo(weight, weightsOf(atStop, error, c, in.options, points));

@@ -127,26 +127,27 @@ Prior makePrior(const MethodInputs& in, const Rgb<float>& variance, const Rgb<fl
   return prior;
 }
 
+constexpr int kGateRadius = 7;
 constexpr float kOutlierVariance = 1.0f / 25;  // of the variance of an outlier that was replaced
 
 // The mean and the halves of x without its lone outliers, whose variance is lowered.
 Estimate withoutOutliers(const Estimate& x, const Estimate& y, Rgb<float>& variance) {
-  JamesSteinSettings settings;
-  settings.gate = true;
-  const Plane<float> gate = noiseScale(variance, settings).gate;
+  const Plane<float> gate = outlierGate(variance, kGateRadius);
   Estimate out;
   out.name = x.name;
   out.passes = x.passes;
   out.mean = x.mean;
   for (int h = 0; h < 2; ++h) out.half[h] = x.half[h];
-  for (size_t i = 0; i < gate.size(); ++i) {
-    if (!isLoneOutlier(gate, x.mean, y.mean, i)) continue;
-    for (size_t c = 0; c < 3; ++c) {
-      out.mean[c][i] = y.mean[c][i];
-      for (int h = 0; h < 2; ++h) out.half[h][c][i] = y.half[h][c][i];
-      variance[c][i] *= kOutlierVariance;
+  parallelChunks(gate.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      if (!isLoneOutlier(gate, x.mean, y.mean, i)) continue;
+      for (size_t c = 0; c < 3; ++c) {
+        out.mean[c][i] = y.mean[c][i];
+        for (int h = 0; h < 2; ++h) out.half[h][c][i] = y.half[h][c][i];
+        variance[c][i] *= kOutlierVariance;
+      }
     }
-  }
+  });
   return out;
 }
 

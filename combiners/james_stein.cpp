@@ -19,10 +19,9 @@
 // Halves of the result. With js-regression the half h is JS(X^h, its variance, own fit of half h): the halves share the
 // bandwidth kappa and the variance of all samples, but no pixel values, so that errors can be measured across them.
 // Their mean is not the result, whose Y* is crossed and whose factors come from all samples. Without js-regression half
-// h is JS(X^h, its variance, Y^h), and the choice between both has the same weights for all of them, as the measured
-// factors are the same. With js-crossed
-// the result is the mean of its halves JS(X^A, Ŷ^B) and JS(X^B, Ŷ^A), which depend on each other: there is no error map
-// then.
+// h is JS(X^h, its variance, Y^h). What halves share beside that are weights and factors over windows: those of the
+// choice of the fit, and the measured factors. With js-crossed the result is the mean of its halves JS(X^A, Ŷ^B) and
+// JS(X^B, Ŷ^A), which depend on each other: there is no error map then.
 #include <utility>
 
 #include "combiners/error_map.h"

@@ -107,26 +107,6 @@ Plane<double> factors(const Plane<double>& squares, const Plane<double>& varianc
   return mirrorBoxMean(factor, s.radius);
 }
 
-// Where the standard deviation of a pixel, over the channels, is beyond 5 times that of its surroundings, one sample
-// carries it: X says nothing there that Y would contradict, unless they differ by 3 deviations or more (k samples of
-// many make sqrt(k)). The deviation around is the square of the mean root, so that a dozen outliers in a window do not
-// hide each other.
-Plane<float> gates(const Rgb<float>& variance, int radius) {
-  Plane<float> deviation(variance.width(), variance.height()), roots(variance.width(), variance.height());
-  forAll(roots.size(), [&](size_t i) {
-    double v = 0;
-    for (size_t c = 0; c < 3; ++c) v += static_cast<double>(variance[c][i]) / 3;
-    deviation[i] = static_cast<float>(std::sqrt(v));
-    roots[i] = std::sqrt(deviation[i]);
-  });
-  const Plane<double> around = mirrorBoxMean(roots, radius);
-  forAll(roots.size(), [&](size_t i) {
-    const auto own = static_cast<double>(deviation[i]);
-    deviation[i] = own > 5 * around[i] * around[i] ? finiteFloat(sqr(3 * own)) : 0.0f;
-  });
-  return deviation;
-}
-
 // The squared differences of X and Y and the variance of X, in units of the scale: what the factors are made of.
 struct Terms {
   Plane<double> squares, noise;
@@ -191,8 +171,28 @@ NoiseScale noiseScale(const Rgb<float>& variance, const JamesSteinSettings& sett
   NoiseScale scale;
   if (settings.filter == VarianceFilter::Whitened)
     for (size_t c = 0; c < 3; ++c) scale.inverseUnit[c] = inverseUnits(variance[c]);
-  if (settings.gate) scale.gate = gates(variance, settings.radius);
+  if (settings.gate) scale.gate = outlierGate(variance, settings.radius);
   return scale;
+}
+
+// Where the standard deviation of a pixel, over the channels, is beyond 5 times that of its surroundings, one sample
+// carries it: X says nothing there that Y would contradict, unless they differ by 3 deviations or more (k samples of
+// many make sqrt(k)). The deviation around is the square of the mean root, so that a dozen outliers in a window do not
+// hide each other.
+Plane<float> outlierGate(const Rgb<float>& variance, int radius) {
+  Plane<float> deviation(variance.width(), variance.height()), roots(variance.width(), variance.height());
+  forAll(roots.size(), [&](size_t i) {
+    double v = 0;
+    for (size_t c = 0; c < 3; ++c) v += static_cast<double>(variance[c][i]) / 3;
+    deviation[i] = static_cast<float>(std::sqrt(v));
+    roots[i] = std::sqrt(deviation[i]);
+  });
+  const Plane<double> around = mirrorBoxMean(roots, radius);
+  forAll(roots.size(), [&](size_t i) {
+    const auto own = static_cast<double>(deviation[i]);
+    deviation[i] = own > 5 * around[i] * around[i] ? finiteFloat(sqr(3 * own)) : 0.0f;
+  });
+  return deviation;
 }
 
 bool isLoneOutlier(const Plane<float>& gate, const Rgb<float>& x, const Rgb<float>& y, size_t i) {

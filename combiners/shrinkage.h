@@ -51,6 +51,10 @@ struct NoiseScale {
 };
 NoiseScale noiseScale(const Rgb<float>& variance, const JamesSteinSettings& settings);
 
+// Where one sample carries a pixel of an image with this variance of the mean: the least mean squared difference from
+// another image that such a pixel contradicts; 0 elsewhere. Compared with windows of (2 radius + 1)² pixels.
+Plane<float> outlierGate(const Rgb<float>& variance, int radius);
+
 // Whether pixel i is a lone outlier of x that does not contradict y; `gate` is that of the noise of x, or empty.
 bool isLoneOutlier(const Plane<float>& gate, const Rgb<float>& x, const Rgb<float>& y, size_t i);
 

@@ -9,7 +9,6 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include "combiners/measured_factors.h"
 #include "combiners/mirror.h"
 #include "combiners/optimised_bias.h"
 #include "combiners/registry.h"
@@ -384,59 +383,6 @@ TEST_CASE("The fit is taken where it helps: nearly as good as the better of with
   // Both happen.
   CHECK(error(exact, 0) < 0.5 * error(exact, 1));
   CHECK(error(dark, 1) < 0.5 * error(dark, 0));
-}
-
-TEST_CASE("Measured factors are the best ones for the other half, by block and channel, without gated pixels") {
-  const Case c = makeCase();
-  const Estimate &x = c.pt(), &y = c.find("narrow");
-  Plane<float> gate(x.mean.width(), x.mean.height());
-  gate.at(12, 9) = 1;
-  const auto factors = measuredFactors(x, y.half, gate, 2);
-  for (const int centre : {10, 20})
-    for (size_t ch = 0; ch < 3; ++ch) {
-      // The error is a parabola in f: its minimum from three values.
-      const auto error = [&](double f) {
-        double sum = 0;
-        for (int v = 10 - 2; v <= 10 + 2; ++v)
-          for (int u = centre - 2; u <= centre + 2; ++u)
-            for (int h = 0; h < 2 && gate.at(u, v) == 0; ++h) {
-              const auto own = static_cast<double>(x.half[h][ch].at(u, v)),
-                         target = static_cast<double>(y.half[h][ch].at(u, v));
-              sum += sqr(target + f * (own - target) - static_cast<double>(x.half[1 - h][ch].at(u, v)));
-            }
-        return sum;
-      };
-      const double a = error(-1), b = error(0), d = error(1), best = 0.5 * (a - d) / (a - 2 * b + d);
-      CHECK(factors[ch].at(centre, 10) == doctest::Approx(std::clamp(best, 0.0, 1.0)).epsilon(1e-6));
-    }
-}
-
-TEST_CASE("Noise that a biased image has of the unbiased one hides less of its error from measured factors") {
-  // Half the noise of X beside an error of its own: (X - Y)² is small, and the paper's factor with it.
-  CaseOptions o;
-  o.samples = 64;
-  Case c = makeCase(o);
-  Estimate y = c.pt();
-  const Rgb<float> sharp = c.truth;
-  const auto mix = [&](Rgb<float>& image) {
-    for (size_t ch = 0; ch < 3; ++ch)
-      for (size_t i = 0; i < image.size(); ++i)
-        image[ch][i] = 0.75f * image[ch][i] + 0.25f * (sharp[ch][i] + 4 * std::sqrt(c.pt().variance[ch][i]));
-  };
-  mix(y.mean);
-  for (Rgb<float>& half : y.half) mix(half);
-  MethodInputs in = inputsOf(c);
-  in.biased = &y;
-  in.options.set("js-regression", 0);
-  const auto error = [&](double measured) {
-    in.options.set("js-measured", measured);
-    return meanSquaredError(make_js()->run(in).image.mean, c.truth);
-  };
-  const double alone = meanSquaredError(c.pt().mean, c.truth);
-  CAPTURE(error(0) / alone);
-  CAPTURE(error(1) / alone);
-  CHECK(error(0) > 1.5 * alone);
-  CHECK(error(1) < 1.25 * alone);
 }
 
 TEST_CASE("The combination converges to X") {

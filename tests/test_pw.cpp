@@ -12,6 +12,7 @@
 #include "combiners/denoise/variance.h"
 #include "renderer/core/error.h"
 #include "tests/combiner_fixture.h"
+#include "tests/plain_window.h"
 
 #if defined(__SSE2__)
 #include <xmmintrin.h>
@@ -39,12 +40,6 @@ Estimate plainEstimate(const Rgb<float>& mean, float variance) {
   return e;
 }
 
-// All pixels up to 5 away, and every second one up to 9.
-bool inWindow(int dx, int dy) {
-  const double distance = std::hypot(dx, dy);
-  return distance <= 5 || (distance <= 9 && std::abs(dx + dy) % 2 == 0);
-}
-
 // One pixel of the filter in double, straight from the formula.
 class PlainFilter {
  public:
@@ -56,7 +51,7 @@ class PlainFilter {
     double total = 0, sum[3] = {0, 0, 0};
     for (int v = std::max(0, y - 9); v <= std::min(input_.height() - 1, y + 9); ++v)
       for (int u = std::max(0, x - 9); u <= std::min(input_.width() - 1, x + 9); ++u) {
-        if (!inWindow(u - x, v - y)) continue;
+        if (!inPlainWindow(u - x, v - y)) continue;
         const double w = weight(x, y, u, v);
         total += w;
         for (size_t c = 0; c < 3; ++c) sum[c] += w * radiance(u, v, c);

@@ -10,6 +10,7 @@
 
 #include "combiners/denoise/pw1_filter.h"
 #include "tests/combiner_fixture.h"
+#include "tests/plain_window.h"
 
 using namespace braid;
 using namespace braid::test;
@@ -52,12 +53,6 @@ Rgb<float> waves(int width, int height) {
   return image;
 }
 
-// All pixels up to 5 away, and every second one up to 9.
-bool inWindow(int dx, int dy) {
-  const double distance = std::hypot(dx, dy);
-  return distance <= 5 || (distance <= 9 && std::abs(dx + dy) % 2 == 0);
-}
-
 // The filter in double for one image without features: weights, fits at the centres, blend.
 class PlainFit {
  public:
@@ -71,7 +66,7 @@ class PlainFit {
     double total = kappa, sum = kappa * zeroOrder;
     for (int v = 0; v < mean_.height(); v += options_.stride)
       for (int u = 0; u < mean_.width(); u += options_.stride) {
-        if (!inWindow(u - x, v - y)) continue;
+        if (!inPlainWindow(u - x, v - y)) continue;
         const double w = weight(u, v, x, y);
         total += w;
         sum += w * prediction(u, v, x, y, channel);
@@ -104,7 +99,7 @@ class PlainFit {
     double m[3][4] = {};
     for (int v = cy - 9; v <= cy + 9; ++v)
       for (int u = cx - 9; u <= cx + 9; ++u) {
-        if (!inside(u, v) || !inWindow(u - cx, v - cy)) continue;
+        if (!inside(u, v) || !inPlainWindow(u - cx, v - cy)) continue;
         const double w = weight(cx, cy, u, v), row[3] = {1, (u - cx) / 9.0, (v - cy) / 9.0};
         for (int i = 0; i < 3; ++i) {
           for (int j = 0; j < 3; ++j) m[i][j] += w * row[i] * row[j];
