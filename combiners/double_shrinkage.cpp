@@ -161,7 +161,7 @@ class DoubleShrinkageMethod : public Method {
   Needs needs() const override {
     Needs needs;
     needs.biased = true;
-    needs.features = true;
+    needs.features = needs.featureNoise = true;
     needs.passes = 4;
     return needs;
   }

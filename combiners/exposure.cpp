@@ -28,78 +28,87 @@ double meanLuminance(const Rgb<float>& image, int x0, int y0, int x1, int y1) {
   return sum / (static_cast<double>(x1 - x0) * (y1 - y0));
 }
 
-// How many values were replaced.
-uint64_t clean(Plane<float>& plane, float lowest) {
-  return parallelSum<uint64_t>(plane.size(), kPixelChunk, 0, [&](size_t begin, size_t end) {
-    uint64_t count = 0;
-    for (size_t i = begin; i < end; ++i)
-      if (!std::isfinite(plane[i]) || plane[i] < lowest) {
-        plane[i] = 0;
-        ++count;
-      }
-    return count;
-  });
-}
-
 constexpr float kAnyFinite = std::numeric_limits<float>::lowest();
 
-void cleanValues(Plane<float>& plane, SanitiseReport& report) { report.nonFinite += clean(plane, kAnyFinite); }
-void cleanVariance(Plane<float>& plane, SanitiseReport& report) {
-  cleanValues(plane, report);
-  report.negativeVariance += clean(plane, 0.0f);
+// The product in double: k² of scenes in physical units is out of the range of floats sooner than the product. What
+// leaves the range stays at its end.
+float times(float value, double k) {
+  constexpr auto kEnd = static_cast<double>(std::numeric_limits<float>::max());
+  return static_cast<float>(std::clamp(static_cast<double>(value) * k, -kEnd, kEnd));
 }
-void cleanValues(Rgb<float>& image, SanitiseReport& report) {
-  for (Plane<float>& p : image.channel) cleanValues(p, report);
+
+// What becomes of the values of a plane.
+struct Change {
+  double factor;
+  float lowest, largest;
+};
+
+float changed(float value, const Change& change, SanitiseReport& report) {
+  if (!std::isfinite(value)) return ++report.nonFinite, 0.0f;
+  if (value < change.lowest) return ++report.negativeVariance, 0.0f;
+  const float product = times(value, change.factor);
+  if (std::fabs(product) <= change.largest) return product;
+  ++report.outOfRange;
+  return std::copysign(change.largest, product);
 }
-void cleanVariance(Rgb<float>& image, SanitiseReport& report) {
-  for (Plane<float>& p : image.channel) cleanVariance(p, report);
+
+// The products, and whether no value needs more than that: nearly always, and in vectors. No number passes no test.
+bool onlyMultiplied(const float* in, size_t count, const Change& change, float* out) {
+  int good = 1;
+  for (size_t i = 0; i < count; ++i) {
+    out[i] = times(in[i], change.factor);
+    good &= static_cast<int>(in[i] >= change.lowest) & static_cast<int>(std::fabs(out[i]) <= change.largest);
+  }
+  return good != 0;
 }
+
+Plane<float> changed(const Plane<float>& in, const Change& change, SanitiseReport& report) {
+  Plane<float> out(in.width, in.height);
+  report += parallelSum(in.size(), kPixelChunk, SanitiseReport{}, [&](size_t begin, size_t end) {
+    SanitiseReport part;
+    if (onlyMultiplied(&in[begin], end - begin, change, &out[begin])) return part;
+    for (size_t i = begin; i < end; ++i) out[i] = changed(in[i], change, part);
+    return part;
+  });
+  return out;
+}
+
+Rgb<float> changed(const Rgb<float>& in, const Change& change, SanitiseReport& report) {
+  Rgb<float> out;
+  for (size_t c = 0; c < 3; ++c) out[c] = changed(in[c], change, report);
+  return out;
+}
+
+Change colours(double k) { return {k, kAnyFinite, kLargest}; }
+Change variances(double k) { return {k * k, 0.0f, kLargest * kLargest}; }
 
 template <class P>
-void cleanFeature(FeaturePlanes<P>& f, SanitiseReport& report) {
-  cleanValues(f.mean, report);
-  cleanValues(f.half[0], report);
-  cleanValues(f.half[1], report);
-  cleanVariance(f.variance, report);
+FeaturePlanes<P> changed(const FeaturePlanes<P>& in, bool noise, SanitiseReport& report) {
+  FeaturePlanes<P> out;
+  out.mean = changed(in.mean, colours(1), report);
+  if (!noise) return out;
+  for (size_t h = 0; h < 2; ++h) out.half[h] = changed(in.half[h], colours(1), report);
+  out.variance = changed(in.variance, variances(1), report);
+  return out;
 }
 
-// In double: k² of scenes in physical units is out of the range of floats sooner than the product. What leaves the
-// range stays at its end.
+Checkpoint changed(const Checkpoint& in, double k, SanitiseReport& report) {
+  Checkpoint out;
+  out.passes = in.passes;
+  out.seconds = in.seconds;
+  out.variance = changed(in.variance, variances(k), report);
+  out.mean = changed(in.mean, colours(k), report);
+  for (size_t h = 0; h < 2; ++h) out.half[h] = changed(in.half[h], colours(k), report);
+  return out;
+}
+
 void multiply(Plane<float>& plane, double k) {
-  constexpr auto kEnd = static_cast<double>(std::numeric_limits<float>::max());
   parallelChunks(plane.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i)
-      plane[i] = static_cast<float>(std::clamp(static_cast<double>(plane[i]) * k, -kEnd, kEnd));
+    for (size_t i = begin; i < end; ++i) plane[i] = times(plane[i], k);
   });
 }
 void multiply(Rgb<float>& image, double k) {
   for (Plane<float>& p : image.channel) multiply(p, k);
-}
-
-uint64_t limit(Plane<float>& p, float largest) {
-  return parallelSum<uint64_t>(p.size(), kPixelChunk, 0, [&](size_t begin, size_t end) {
-    uint64_t count = 0;
-    for (size_t i = begin; i < end; ++i)
-      if (std::fabs(p[i]) > largest) {
-        p[i] = std::copysign(largest, p[i]);
-        ++count;
-      }
-    return count;
-  });
-}
-uint64_t limit(Rgb<float>& image, float largest) {
-  uint64_t moved = 0;
-  for (Plane<float>& p : image.channel) moved += limit(p, largest);
-  return moved;
-}
-template <class P>
-uint64_t limitFeature(FeaturePlanes<P>& f) {
-  return limit(f.mean, kLargest) + limit(f.half[0], kLargest) + limit(f.half[1], kLargest) +
-         limit(f.variance, kLargest * kLargest);
-}
-
-SanitiseReport operator+(const SanitiseReport& a, const SanitiseReport& b) {
-  return {a.nonFinite + b.nonFinite, a.negativeVariance + b.negativeVariance, a.outOfRange + b.outOfRange};
 }
 
 }  // namespace
@@ -126,68 +135,42 @@ double exposureScale(const Rgb<float>& image) {
   return count > 0 ? kMiddleGrey / std::exp2(sum / count) : 1.0;
 }
 
-SanitiseReport sanitise(Estimate& e) {
-  SanitiseReport report;
-  for (Rgb<float>* image : {&e.mean, &e.half[0], &e.half[1], &e.bias}) cleanValues(*image, report);
-  for (Rgb<float>& q : e.quarter) cleanValues(q, report);
-  cleanVariance(e.variance, report);
-  cleanVariance(e.biasVariance, report);
-  return report;
+Estimate normalised(const Estimate& e, double k, SanitiseReport& report, bool quarters) {
+  Estimate out;
+  static_cast<EstimateHead&>(out) = e;
+  out.mean = changed(e.mean, colours(k), report);
+  for (size_t h = 0; h < 2; ++h) out.half[h] = changed(e.half[h], colours(k), report);
+  if (quarters)
+    for (const Rgb<float>& q : e.quarter) out.quarter.push_back(changed(q, colours(k), report));
+  out.variance = changed(e.variance, variances(k), report);
+  out.bias = changed(e.bias, colours(k), report);
+  out.biasVariance = changed(e.biasVariance, variances(k), report);
+  return out;
 }
 
-SanitiseReport sanitise(Estimates& all) {
-  SanitiseReport report;
-  for (Estimate& e : all.estimates) report = report + sanitise(e);
-  for (auto& [name, checkpoints] : all.history)
-    for (Checkpoint& c : checkpoints) {
-      cleanVariance(c.variance, report);
-      for (Rgb<float>* image : {&c.mean, &c.half[0], &c.half[1]}) cleanValues(*image, report);
-    }
-  if (all.features) {
-    cleanFeature(all.features->albedo, report);
-    cleanFeature(all.features->normal, report);
-    cleanFeature(all.features->depth, report);
-    cleanFeature(all.features->visibility, report);
-  }
-  return report;
+Estimates normalised(const Estimates& all, double k, SanitiseReport& report, const PlanesRead& read) {
+  Estimates out;
+  static_cast<EstimatesHead&>(out) = all;
+  for (const Estimate& e : all.estimates) out.estimates.push_back(normalised(e, k, report, read.quarters));
+  if (read.history)
+    for (const auto& [name, checkpoints] : all.history)
+      for (const Checkpoint& c : checkpoints) out.history[name].push_back(changed(c, k, report));
+  if (!all.features || !read.features) return out;
+  Features& features = out.features.emplace();
+  features.albedo = changed(all.features->albedo, read.featureNoise, report);
+  features.normal = changed(all.features->normal, read.featureNoise, report);
+  features.depth = changed(all.features->depth, read.featureNoise, report);
+  features.visibility = changed(all.features->visibility, read.featureNoise, report);
+  return out;
 }
 
-uint64_t limitRange(Estimates& all) {
-  uint64_t moved = 0;
-  for (Estimate& e : all.estimates) {
-    for (Rgb<float>* image : {&e.mean, &e.half[0], &e.half[1], &e.bias}) moved += limit(*image, kLargest);
-    for (Rgb<float>& q : e.quarter) moved += limit(q, kLargest);
-    for (Rgb<float>* variance : {&e.variance, &e.biasVariance}) moved += limit(*variance, kLargest * kLargest);
-  }
-  for (auto& [name, checkpoints] : all.history)
-    for (Checkpoint& c : checkpoints) {
-      moved += limit(c.variance, kLargest * kLargest);
-      for (Rgb<float>* image : {&c.mean, &c.half[0], &c.half[1]}) moved += limit(*image, kLargest);
-    }
-  if (all.features)
-    moved += limitFeature(all.features->albedo) + limitFeature(all.features->normal) +
-             limitFeature(all.features->depth) + limitFeature(all.features->visibility);
-  return moved;
-}
-
-void scaleExposure(Estimate& e, double k) {
-  for (Rgb<float>* image : {&e.mean, &e.half[0], &e.half[1], &e.bias}) multiply(*image, k);
-  for (Rgb<float>& q : e.quarter) multiply(q, k);
-  for (Rgb<float>* variance : {&e.variance, &e.biasVariance}) multiply(*variance, k * k);
-}
-
-void scaleExposure(Estimates& all, double k) {
-  for (Estimate& e : all.estimates) scaleExposure(e, k);
-  for (auto& [name, checkpoints] : all.history)
-    for (Checkpoint& c : checkpoints) {
-      multiply(c.variance, k * k);
-      for (Rgb<float>* image : {&c.mean, &c.half[0], &c.half[1]}) multiply(*image, k);
-    }
-}
-
-void scaleExposure(MethodResult& result, double k) {
-  scaleExposure(result.image, k);
-  multiply(result.error, k * k);
+void undoExposure(MethodResult& result, double k) {
+  const double back = 1 / k;
+  Estimate& e = result.image;
+  for (Rgb<float>* image : {&e.mean, &e.half[0], &e.half[1], &e.bias}) multiply(*image, back);
+  for (Rgb<float>& q : e.quarter) multiply(q, back);
+  for (Rgb<float>* variance : {&e.variance, &e.biasVariance}) multiply(*variance, back * back);
+  multiply(result.error, back * back);
 }
 
 }  // namespace braid

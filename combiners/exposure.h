@@ -21,19 +21,28 @@ struct SanitiseReport {
   uint64_t negativeVariance = 0;  // values set to 0
   uint64_t outOfRange = 0;        // values moved to the limit
   bool clean() const { return nonFinite == 0 && negativeVariance == 0 && outOfRange == 0; }
+  SanitiseReport& operator+=(const SanitiseReport& other) {
+    nonFinite += other.nonFinite;
+    negativeVariance += other.negativeVariance;
+    outOfRange += other.outOfRange;
+    return *this;
+  }
 };
 
-// Sets every non-finite value to 0, and every negative variance.
-SanitiseReport sanitise(Estimate& estimate);
-SanitiseReport sanitise(Estimates& estimates);
+// Which planes a copy holds besides means, halves, variances and biases.
+struct PlanesRead {
+  bool quarters = true, history = true;
+  bool features = true, featureNoise = true;  // the noise: halves and variances
+};
 
-// Moves normalised colours and features beyond ±10⁹ to that limit, and variances beyond its square, so that fourth
-// powers stay within floats. The sun in a dark room is below it. Returns how many.
-uint64_t limitRange(Estimates& estimates);
+// The estimates as methods see them. Non-finite values and negative variances become 0. Colours and biases are
+// multiplied by k, variances by k². Colours and features beyond ±10⁹ are moved to that limit, and variances beyond its
+// square, so that fourth powers stay within floats; the sun in a dark room is below it. What was changed is added to
+// the report.
+Estimates normalised(const Estimates& estimates, double k, SanitiseReport& report, const PlanesRead& read = {});
+Estimate normalised(const Estimate& estimate, double k, SanitiseReport& report, bool quarters = true);
 
-// Multiplies colours and biases by k, variances and squared errors by k².
-void scaleExposure(Estimate& estimate, double k);
-void scaleExposure(Estimates& estimates, double k);
-void scaleExposure(MethodResult& result, double k);
+// Back to the units of the estimates: colours and biases are divided by k, variances and squared errors by k².
+void undoExposure(MethodResult& result, double k);
 
 }  // namespace braid

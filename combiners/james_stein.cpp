@@ -66,7 +66,7 @@ class JamesStein : public Method {
   Needs needs() const override {
     Needs needs;
     needs.biased = true;
-    needs.features = true;
+    needs.features = needs.featureNoise = true;
     needs.passes = 4;
     return needs;
   }

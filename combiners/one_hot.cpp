@@ -38,7 +38,7 @@ Plane<float> sampleVariance(const std::vector<const Plane<float>*>& ofMean, doub
 }
 
 double highQuantile(const Plane<float>& plane) {
-  std::vector<float> values = plane.data;
+  std::vector<float> values(plane.data.begin(), plane.data.end());
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(0.999 * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());
   return static_cast<double>(*at);

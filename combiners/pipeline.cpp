@@ -52,9 +52,10 @@ void checkSizes(const Estimates& all) {
 
 class Runner {
  public:
-  Runner(const Estimates& estimates, const PipelineOptions& options) : all_(estimates), options_(options) {}
+  explicit Runner(const PipelineOptions& options) : options_(options) {}
 
-  void normalise(const std::string& unbiased);
+  // Takes of the estimates what the recipe reads.
+  void normalise(const Estimates& estimates, const Recipe& recipe);
   // Makes estimates of the earlier images that steps read.
   void keepEarlier(const Recipe& recipe);
   void run(Step step);
@@ -71,17 +72,18 @@ class Runner {
 
   using Earlier = std::pair<std::string, uint64_t>;  // name, passes
 
-  Estimates all_;                        // sanitised and normalised; so are the results until finish()
+  Estimates all_;                        // normalised; so are the results until finish()
   std::map<Earlier, Estimate> earlier_;  // images of checkpoints
   const PipelineOptions& options_;
 };
 
-void Runner::normalise(const std::string& unbiased) {
-  result.sanitised = sanitise(all_);
-  const Estimate* e = all_.find(unbiased);
+void Runner::normalise(const Estimates& estimates, const Recipe& recipe) {
+  std::string unbiased;
+  for (const Step& step : recipe.steps)
+    if (unbiased.empty()) unbiased = step.unbiased;
+  const Estimate* e = estimates.find(unbiased);
   result.exposure = options_.exposure > 0 ? options_.exposure : e ? exposureScale(e->mean) : 1.0;
-  scaleExposure(all_, result.exposure);
-  result.sanitised.outOfRange = limitRange(all_);
+  all_ = normalised(estimates, result.exposure, result.sanitised, planesRead(recipe));
 }
 
 void Runner::keepEarlier(const Recipe& recipe) {
@@ -199,7 +201,7 @@ void Runner::run(Step step) {
 }
 
 void Runner::finish() {
-  for (PipelineOutput& out : result.outputs) scaleExposure(out.result, 1 / result.exposure);
+  for (PipelineOutput& out : result.outputs) undoExposure(out.result, result.exposure);
 }
 
 Attribute textAttribute(const std::string& name, const std::string& value) {
@@ -217,15 +219,17 @@ const PipelineOutput* PipelineResult::find(const std::string& name) const {
   return nullptr;
 }
 
+PlanesRead planesRead(const Recipe& recipe) {
+  const RecipeNeeds needs = needsOf(recipe);
+  return {needs.quarters, needs.checkpoints > 0 || !needs.stops.empty(), needs.features, needs.featureNoise};
+}
+
 PipelineResult runPipeline(const Estimates& estimates, const std::vector<std::string>& wanted,
                            const PipelineOptions& options) {
   checkSizes(estimates);
   const Recipe recipe = makeRecipe(factsOf(estimates), wanted, options.roles);
-  Runner runner(estimates, options);
-  std::string unbiased;
-  for (const Step& step : recipe.steps)
-    if (unbiased.empty()) unbiased = step.unbiased;
-  runner.normalise(unbiased);
+  Runner runner(options);
+  runner.normalise(estimates, recipe);
   runner.keepEarlier(recipe);
   for (const Step& step : recipe.steps) {
     if (options.cancel && options.cancel->load()) break;

@@ -42,6 +42,9 @@ struct PipelineResult {
   const PipelineOutput* find(const std::string& name) const;
 };
 
+// Which planes the steps that can run read: no others are copied for them.
+PlanesRead planesRead(const Recipe& recipe);
+
 // Runs the wanted methods and what they need. A denoiser's image becomes an estimate that is not unbiased; its halves
 // are the method's own responsibility. The callback that runs a denoiser on another image, for SURE, moves the halves
 // and quarters along with the mean, so that the mean stays the mean of the halves. Throws Error(Usage) for unknown

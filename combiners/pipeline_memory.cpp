@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "combiners/pipeline.h"
+
 namespace braid {
 
 namespace {
@@ -45,15 +47,35 @@ MethodMemory memoryOf(const Step& step, const Recipe& recipe, const Facts& facts
   return memory;
 }
 
-}  // namespace
-
-int estimatesMemory(const Facts& facts) {
-  int bytes = facts.features ? 4 * kFeatureComponents * static_cast<int>(sizeof(float)) : 0;
+// Of the estimates alone.
+int colourMemory(const Facts& facts) {
+  int bytes = 0;
   for (const EstimateFacts& e : facts.estimates) bytes += imagesOf(e) + historyOf(e);
   return bytes;
 }
 
-uint64_t pipelineMemory(const Recipe& recipe, const Facts& facts, uint64_t pixels, int threads) {
+// With the mean, two halves and the variance, or the mean alone.
+int featureMemory(bool noise) { return (noise ? 4 : 1) * kFeatureComponents * static_cast<int>(sizeof(float)); }
+
+Facts copiedFacts(Facts facts, const PlanesRead& read) {
+  for (EstimateFacts& e : facts.estimates) {
+    e.quarters &= read.quarters;
+    if (read.history) continue;
+    e.checkpoints = 0;
+    e.kept.clear();
+  }
+  facts.features &= read.features;
+  return facts;
+}
+
+}  // namespace
+
+int estimatesMemory(const Facts& facts) { return colourMemory(facts) + (facts.features ? featureMemory(true) : 0); }
+
+uint64_t pipelineMemory(const Recipe& recipe, const Facts& given, uint64_t pixels, int threads) {
+  const PlanesRead read = planesRead(recipe);
+  const Facts facts = copiedFacts(given, read);
+  const int copy = colourMemory(facts) + (facts.features ? featureMemory(read.featureNoise) : 0);
   uint64_t kept = 0, peak = 0;  // bytes
   for (const Step& step : recipe.steps) {
     if (!step.obstacle.empty()) continue;
@@ -62,7 +84,7 @@ uint64_t pipelineMemory(const Recipe& recipe, const Facts& facts, uint64_t pixel
         peak, kept + pixels * static_cast<uint64_t>(memory.peak) + memory.eachThread * static_cast<uint64_t>(threads));
     kept += pixels * static_cast<uint64_t>(memory.kept);
   }
-  return peak > 0 ? pixels * static_cast<uint64_t>(estimatesMemory(facts)) + peak : 0;
+  return peak > 0 ? pixels * static_cast<uint64_t>(copy) + peak : 0;
 }
 
 }  // namespace braid

@@ -9,8 +9,8 @@ namespace braid {
 // Bytes a pixel of float planes with these facts: estimates, features, and images kept for the stop of denoising.
 int estimatesMemory(const Facts& facts);
 
-// Bytes that runPipeline() takes at the most at a time beside the estimates that it is handed: its own copy of them,
-// the results so far, and what the method at work needs.
+// Bytes that runPipeline() takes at the most at a time beside the estimates that it is handed: its own copy of
+// what methods read of them, the results so far, and what the method at work needs.
 uint64_t pipelineMemory(const Recipe& recipe, const Facts& facts, uint64_t pixels, int threads);
 
 }  // namespace braid

@@ -325,6 +325,7 @@ RecipeNeeds needsOf(const Recipe& recipe) {
     const Needs needs = step.method->needs();
     all.quarters |= needs.quarters || needs.quartersHelp;
     all.features |= needs.features;
+    all.featureNoise |= needs.featureNoise;
     all.checkpoints = std::max(all.checkpoints, needs.checkpoints);
     if (step.stop > 0) all.stops.push_back(step.stop);
   }

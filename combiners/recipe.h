@@ -87,7 +87,7 @@ Recipe makeRecipe(const Facts& facts, const std::vector<std::string>& wanted, co
 
 // What a render must keep for the steps that can run.
 struct RecipeNeeds {
-  bool quarters = false, features = false;
+  bool quarters = false, features = false, featureNoise = false;
   int checkpoints = 0;
   std::vector<uint64_t> stops{};  // passes after which the image is kept, rising
 };

@@ -16,7 +16,7 @@ const P& select(const FeaturePlanes<P>& planes, Samples samples) {
 }
 
 float percentile(const Plane<float>& in, double fraction) {
-  std::vector<float> values = in.data;
+  std::vector<float> values(in.data.begin(), in.data.end());
   const auto k = static_cast<size_t>(fraction * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k), values.end());
   return values[k];

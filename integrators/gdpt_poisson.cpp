@@ -119,7 +119,7 @@ void solveScreenedPoisson(Plane<double>& rhs, double alpha) {
   const Lines rows{width, height, 1, width}, columns{height, width, width, 1};
   const double screen = 0.5 * alpha * alpha;
   const std::vector<double> p = wachspressParameters(screen, screen + 4);
-  const std::vector<double> b = rhs.data;
+  const PixelBuffer<double> b = rhs.data;
   double* r = rhs.data.data();
   for (size_t k = 0; k < p.size(); ++k) {
     const bool last = k + 1 == p.size();

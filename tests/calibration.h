@@ -30,8 +30,8 @@ class Calibration {
  public:
   explicit Calibration(const RenderResult& pilot) : weight_(pilot.estimates->width, pilot.estimates->height) {
     for (size_t c = 0; c < 3; ++c) {
-      const std::vector<float>& v = estimateOf(pilot).variance[c].data;
-      std::vector<float> sorted = v;
+      const PixelBuffer<float>& v = estimateOf(pilot).variance[c].data;
+      std::vector<float> sorted(v.begin(), v.end());
       std::nth_element(sorted.begin(), sorted.begin() + static_cast<ptrdiff_t>(v.size() / 2), sorted.end());
       for (size_t i = 0; i < v.size(); ++i) weight_[c][i] = 1 / static_cast<double>(v[i] + sorted[v.size() / 2]);
     }

@@ -293,10 +293,9 @@ class StiffInputs {
  public:
   explicit StiffInputs(const StiffCase& s) : all_(s.c.estimates), replaces_(s.replacesBiased) {
     for (const Estimate& d : s.c.denoised) all_.estimates.push_back(d);
-    sanitise(all_);
     exposure_ = exposureScale(all_.find("pt")->mean);
-    scaleExposure(all_, exposure_);
-    limitRange(all_);
+    SanitiseReport report;
+    all_ = normalised(all_, exposure_, report);
   }
   StiffInputs(const StiffInputs&) = delete;
   StiffInputs& operator=(const StiffInputs&) = delete;

@@ -71,7 +71,7 @@ TEST_CASE("The SBF filter keeps constants, is the formula at a pixel, and does n
   const Features& g = *c.estimates.features;
   const std::vector<Plane<float>> ramp = {c.truth[0]};
   const Plane<float> filtered = featureFiltered(ramp, &g, 32)[0];
-  std::vector<float> depths = g.depth.mean.data;
+  std::vector<float> depths(g.depth.mean.data.begin(), g.depth.mean.data.end());
   std::sort(depths.begin(), depths.end());
   const double deepest =
       static_cast<double>(depths[static_cast<size_t>(0.999 * static_cast<double>(depths.size() - 1))]);

@@ -90,6 +90,12 @@ TEST_CASE("The exposure scale brings any image to middle grey, whatever its unit
 }
 
 TEST_CASE("Bad values are set to zero and counted") {
+  // In place; and the report.
+  const auto sanitise = [](Estimates& e) {
+    SanitiseReport report;
+    e = normalised(e, 1, report);
+    return report;
+  };
   Estimates e = makeCase(sized(8, 6)).estimates;
   CHECK(sanitise(e).clean());
   e.estimates[0].mean[0][3] = kInfinity;
@@ -102,6 +108,7 @@ TEST_CASE("Bad values are set to zero and counted") {
   const SanitiseReport report = sanitise(e);
   CHECK(report.nonFinite == 5);
   CHECK(report.negativeVariance == 2);
+  CHECK(report.outOfRange == 0);
   CHECK(e.estimates[0].mean[0][3] == 0);
   CHECK(e.estimates[0].variance[0][0] == 0);
   CHECK(sanitise(e).clean());
@@ -111,17 +118,62 @@ TEST_CASE("Bad values are set to zero and counted") {
 }
 
 TEST_CASE("Scaling multiplies colours by k and variances by its square, and back") {
-  Estimates e = makeCase(sized(8, 6)).estimates;
-  const Estimates before = e;
-  scaleExposure(e, 4);
+  const Estimates before = makeCase(sized(8, 6)).estimates;
+  SanitiseReport report;
+  const Estimates e = normalised(before, 4, report);
   CHECK(e.estimates[2].mean[1][9] == 4 * before.estimates[2].mean[1][9]);
   CHECK(e.estimates[2].quarter[3][1][9] == 4 * before.estimates[2].quarter[3][1][9]);
   CHECK(e.estimates[2].bias[1][9] == 4 * before.estimates[2].bias[1][9]);
   CHECK(e.estimates[2].variance[1][9] == 16 * before.estimates[2].variance[1][9]);
   CHECK(e.estimates[2].biasVariance[1][9] == 16 * before.estimates[2].biasVariance[1][9]);
-  CHECK(e.history["pt"][2].variance[1][9] == 16 * before.history.at("pt")[2].variance[1][9]);
-  scaleExposure(e, 0.25);
-  for (size_t i = 0; i < 3; ++i) CHECK(identical(e.estimates[i].variance, before.estimates[i].variance));
+  CHECK(e.history.at("pt")[2].variance[1][9] == 16 * before.history.at("pt")[2].variance[1][9]);
+  CHECK(identical(e.features->albedo.variance, before.features->albedo.variance));
+  CHECK(report.clean());
+  for (size_t i = 0; i < 3; ++i) {
+    MethodResult r;
+    r.image = e.estimates[i];
+    r.error = e.estimates[i].variance[0];
+    undoExposure(r, 4);
+    CHECK(identical(r.image.mean, before.estimates[i].mean));
+    CHECK(identical(r.image.quarter[3], before.estimates[i].quarter[3]));
+    CHECK(identical(r.image.variance, before.estimates[i].variance));
+    CHECK(identical(r.error, before.estimates[i].variance[0]));
+  }
+}
+
+TEST_CASE("Normalised values beyond the range of methods are moved to its end") {
+  Estimates e = makeCase(sized(8, 6)).estimates;
+  e.estimates[0].mean[0][3] = 1e9f;
+  e.estimates[0].half[1][2][5] = -3e38f;
+  e.estimates[0].variance[1][0] = 1e18f;
+  e.features->depth.mean[2] = 1e10f;
+  SanitiseReport report;
+  const Estimates n = normalised(e, 2, report);
+  CHECK(report.outOfRange == 4);
+  CHECK(n.estimates[0].mean[0][3] == 1e9f);
+  CHECK(n.estimates[0].half[1][2][5] == -1e9f);
+  CHECK(n.estimates[0].variance[1][0] == doctest::Approx(1e18f));
+  CHECK(n.features->depth.mean[2] == 1e9f);
+}
+
+TEST_CASE("What no method reads is not copied") {
+  const Estimates all = makeCase(sized(8, 6)).estimates;
+  SanitiseReport report;
+  const Estimates few = normalised(all, 1, report, {false, false, true, false});
+  CHECK(few.estimates[0].quarter.empty());
+  CHECK(few.history.empty());
+  CHECK(identical(few.features->normal.mean, all.features->normal.mean));
+  CHECK(few.features->normal.half[0].empty());
+  CHECK(few.features->depth.variance.empty());
+  CHECK_FALSE(normalised(all, 1, report, {true, true, false, true}).features);
+  const auto read = [&](const char* method) { return planesRead(makeRecipe(factsOf(all), {method}, {})); };
+  CHECK(read("nfor").featureNoise);
+  CHECK_FALSE(read("nfor").quarters);
+  CHECK(read("auto").features);
+  CHECK_FALSE(read("auto").featureNoise);
+  CHECK_FALSE(read("auto").history);
+  CHECK(read("curves@nlm").history);
+  CHECK_FALSE(read("box").features);
 }
 
 TEST_CASE("Estimates fill their roles, and names override the rules") {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What goes to the viewer tev: read back by a parser written from the description of the protocol alone, and viewers
 // that are not there, hang or come and go.
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <limits>
@@ -324,9 +325,10 @@ TEST_CASE("render --tev shows what it saves, and no viewer changes a pixel") {
   for (const auto& [view, layer] : {std::pair("noisy", "pt.mean."), {"combined", "combined.js."}})
     for (const char* channel : {"R", "G", "B"}) {
       const Plane<float>& plane = saved.planes.at(std::string(layer) + channel);
-      CHECK((v.images.at(std::string("cornell.glb: ") + view).channels.at(channel) == plane.data));
+      CHECK(std::ranges::equal(v.images.at(std::string("cornell.glb: ") + view).channels.at(channel), plane.data));
     }
-  CHECK((v.images.at("cornell.glb: combined").channels.at("Error.Y") == saved.planes.at("Error.R").data));
+  CHECK(
+      std::ranges::equal(v.images.at("cornell.glb: combined").channels.at("Error.Y"), saved.planes.at("Error.R").data));
 }
 
 TEST_CASE("A viewer that vanishes in the middle of a render ends nothing") {

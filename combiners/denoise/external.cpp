@@ -86,9 +86,9 @@ MethodResult External::run(const MethodInputs& in) const {
     e.half[0] = checked(file, "halfA", like);
     e.half[1] = checked(file, "halfB", like);
   }
-  const SanitiseReport report = sanitise(e);
+  SanitiseReport report;
   // Files hold the units of the render; what methods see is exposure-normalised.
-  scaleExposure(e, in.options.number(kPipelineExposure));
+  e = normalised(e, in.options.number(kPipelineExposure), report);
   Attribute bad;
   bad.name = "nonFiniteInputs";
   bad.kind = Attribute::Kind::Int;

@@ -51,7 +51,7 @@ RawChannel rawChannel(const Plane<float>& mean, const Plane<float>& a, const Pla
 }
 
 float highPercentile(const Plane<float>& in) {
-  std::vector<float> values = in.data;
+  std::vector<float> values(in.data.begin(), in.data.end());
   for (float& v : values) v = std::isfinite(v) ? v : 0.0f;
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(0.999 * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());

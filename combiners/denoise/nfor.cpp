@@ -48,6 +48,7 @@ class Nfor : public Method {
   Needs needs() const override {
     Needs needs;
     needs.passes = 2;
+    needs.features = needs.featureNoise = true;
     needs.variance = false;
     return needs;
   }

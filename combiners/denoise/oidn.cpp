@@ -117,7 +117,7 @@ class Oidn : public OutsideMethod {
   Needs needs() const override {
     Needs needs;
     needs.passes = 1;
-    needs.features = true;
+    needs.features = needs.featureNoise = true;
     needs.halves = needs.variance = false;
     return needs;
   }

@@ -37,6 +37,7 @@ class Rdfc : public Method {
   Needs needs() const override {
     Needs needs;
     needs.passes = 2;
+    needs.features = needs.featureNoise = true;
     needs.halves = needs.variance = false;
     return needs;
   }

@@ -6,8 +6,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
+#include "renderer/core/pixel_buffer.h"
 #include "renderer/core/vec.h"
 
 namespace braid {
@@ -18,7 +18,7 @@ constexpr int64_t kMaxPixels = int64_t(1) << 28;
 template <class T>
 struct Plane {
   int width = 0, height = 0;
-  std::vector<T> data;
+  PixelBuffer<T> data;
 
   Plane() = default;
   Plane(int w, int h, T value = T{})

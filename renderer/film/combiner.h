@@ -47,6 +47,7 @@ struct Needs {
   bool quarters = false;      // of the unbiased (and the correlated) estimate
   bool quartersHelp = false;  // works without, but worse
   bool features = false;      // works without, but worse
+  bool featureNoise = false;  // of the features not only the means, also halves and variances
   int checkpoints = 0;
   uint64_t passes = 2;     // of the unbiased estimate
   bool halves = true;      // of the unbiased and the biased image and the bases; false: works on the means alone

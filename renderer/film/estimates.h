@@ -16,14 +16,18 @@ namespace braid {
 // What the pixels of one pass share: nothing, their random numbers, or a reconstruction from each other's gradients.
 enum class Correlation { Independent, CommonRandomNumbers, Gradients };
 
-// One integrator's image so far.
-struct Estimate {
+// What is known of an estimate besides its images.
+struct EstimateHead {
   std::string name;
   bool unbiased = true;
   Correlation correlation = Correlation::Independent;
   uint64_t passes = 0;
   double seconds = 0;
   uint64_t rejected = 0;
+};
+
+// One integrator's image so far.
+struct Estimate : EstimateHead {
   Rgb<float> mean;
   Rgb<float> half[2];               // A, B
   std::vector<Rgb<float>> quarter;  // four, or none
@@ -62,11 +66,15 @@ struct Attribute {
   std::vector<float> values;  // Matrix: 16, row-major as OpenImageIO wants it; Chromaticities: 8
 };
 
-struct Estimates {
+// Of which image the estimates are.
+struct EstimatesHead {
   int width = 0, height = 0;  // of the planes: the window
   PixelWindow window;         // the part of the full frame that the planes hold
   int fullWidth = 0, fullHeight = 0;
   uint64_t seed = 0;
+};
+
+struct Estimates : EstimatesHead {
   std::vector<Estimate> estimates;
   std::optional<Features> features;
   std::vector<Attribute> attributes;

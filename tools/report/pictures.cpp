@@ -143,7 +143,7 @@ Plane<double> cropped(const Plane<double>& plane, const PixelWindow& window) { r
 
 PixelWindow worstWindow(const Plane<double>& errors, int size) {
   const int width = std::min(size, errors.width), height = std::min(size, errors.height);
-  const double limit = percentile(errors.data, 0.99);
+  const double limit = percentile({errors.data.begin(), errors.data.end()}, 0.99);
   PixelWindow worst{0, 0, width, height};
   double largest = -1;
   const int step = std::max(1, size / 4);

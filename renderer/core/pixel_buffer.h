@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// Memory of image planes. The first touch of memory costs more than most loops over it: large buffers come from the
+// system as zeros, so that the loop that fills them touches them first, on all threads, and in huge pages where the
+// system has any. What else touches them whole, copies and fills, does so in parallel.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <type_traits>
+#include <utility>
+
+#include "renderer/core/parallel.h"
+
+namespace braid {
+
+// Bytes from which on a buffer is mapped by itself instead of taken from the heap.
+constexpr size_t kMappedBytes = size_t(1) << 20;
+
+// Memory that holds zeros, aligned to 64 bytes. Throws std::bad_alloc.
+void* allocatePixels(size_t bytes);
+void freePixels(void* memory, size_t bytes) noexcept;
+
+// So many values of a plain type, all the same at first; owned, and copied with it.
+template <class T>
+class PixelBuffer {
+  static_assert(std::is_trivially_copyable_v<T>);
+
+ public:
+  using value_type = T;
+
+  PixelBuffer() = default;
+  PixelBuffer(size_t size, T value) : data_(static_cast<T*>(allocatePixels(size * sizeof(T)))), size_(size) {
+    if (!isZero(value)) inParallel([&](size_t begin, size_t end) { std::fill(data_ + begin, data_ + end, value); });
+  }
+  PixelBuffer(const PixelBuffer& other) : PixelBuffer(other.size_, T{}) { copy(other); }
+  PixelBuffer(PixelBuffer&& other) noexcept { swap(other); }
+  PixelBuffer& operator=(const PixelBuffer& other) {
+    if (this == &other) return *this;
+    if (size_ == other.size_)
+      copy(other);
+    else
+      PixelBuffer(other).swap(*this);
+    return *this;
+  }
+  PixelBuffer& operator=(PixelBuffer&& other) noexcept {
+    PixelBuffer(std::move(other)).swap(*this);
+    return *this;
+  }
+  ~PixelBuffer() { freePixels(data_, size_ * sizeof(T)); }
+
+  void swap(PixelBuffer& other) noexcept {
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+  }
+
+  size_t size() const { return size_; }
+  bool empty() const { return size_ == 0; }
+  T* data() { return data_; }
+  const T* data() const { return data_; }
+  T* begin() { return data_; }
+  T* end() { return data_ + size_; }
+  const T* begin() const { return data_; }
+  const T* end() const { return data_ + size_; }
+  T& operator[](size_t i) { return data_[i]; }
+  const T& operator[](size_t i) const { return data_[i]; }
+
+  friend bool operator==(const PixelBuffer& a, const PixelBuffer& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end());
+  }
+
+ private:
+  static bool isZero(const T& value) {
+    const T zero{};
+    return std::memcmp(&value, &zero, sizeof(T)) == 0;
+  }
+
+  template <class Body>
+  void inParallel(const Body& body) {
+    constexpr size_t kChunk = size_t(1) << 16;
+    if (size_ * sizeof(T) < kMappedBytes)
+      body(size_t(0), size_);
+    else
+      parallelChunks(size_, kChunk, body);
+  }
+
+  void copy(const PixelBuffer& other) {
+    inParallel([&](size_t begin, size_t end) { std::copy(other.data_ + begin, other.data_ + end, data_ + begin); });
+  }
+
+  T* data_ = nullptr;
+  size_t size_ = 0;
+};
+
+}  // namespace braid
