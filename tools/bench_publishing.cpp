@@ -13,6 +13,7 @@
 #include "renderer/core/stopwatch.h"
 #include "renderer/session/session.h"
 #include "tools/combining.h"
+#include "tools/header.h"
 #include "tools/publisher.h"
 
 namespace braid {
@@ -74,7 +75,8 @@ nlohmann::json benchPublishing(const Scene& scene, const CameraData& camera, con
       ImageOutput plain = options.image;
       plain.combine.combine = "none";
       const std::optional<Plane<float>> alpha = session.alpha();
-      writeImage(plain, describedEstimates(session, true), alpha ? &*alpha : nullptr, settings.threads);
+      Estimates estimates = describedEstimates(session, true);
+      writeImage(plain, estimates, alpha ? &*alpha : nullptr, settings.threads);
     }));
     published.push_back(costOf([&] {
       Session session(scene, plan);

@@ -92,6 +92,17 @@ std::vector<Attribute> passAttributes(const Estimates& estimates, double seconds
   return list;
 }
 
+Estimates describedEstimates(const FilmState& state, bool quarters, bool timing) {
+  Estimates e = estimatesOf(state, quarters);
+  e.attributes = state.attributes;
+  for (Attribute& a : passAttributes(e, state.seconds, timing)) e.attributes.push_back(std::move(a));
+  return e;
+}
+
+Estimates describedEstimates(const Session& session, bool timing) {
+  return describedEstimates(session.state(), session.plan().settings.quarters, timing);
+}
+
 std::vector<Attribute> headerAttributes(const Scene& scene, const Session& session, const RenderResult& result,
                                         const std::string& isa, bool timing) {
   std::vector<Attribute> list = planAttributes(scene, session.plan(), isa);

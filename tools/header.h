@@ -18,6 +18,10 @@ std::vector<Attribute> planAttributes(const Scene& scene, const Plan& plan, cons
 // runs; `seconds`: of the pass loops.
 std::vector<Attribute> passAttributes(const Estimates& estimates, double seconds, bool timing);
 
+// The estimates of a state with the header of an image file.
+Estimates describedEstimates(const FilmState& state, bool quarters, bool timing);
+Estimates describedEstimates(const Session& session, bool timing);
+
 // Both, of a render that has ended.
 std::vector<Attribute> headerAttributes(const Scene& scene, const Session& session, const RenderResult& result,
                                         const std::string& isa, bool timing);

@@ -104,7 +104,7 @@ void showImages(const Estimates& estimates, const PipelineResult& combined, cons
   show(views);
 }
 
-WrittenImage writeImage(const ImageOutput& o, Estimates estimates, const Plane<float>* alpha, int threads,
+WrittenImage writeImage(const ImageOutput& o, Estimates& estimates, const Plane<float>* alpha, int threads,
                         const std::atomic<bool>* cancel) {
   WrittenImage written;
   const std::vector<std::string> wanted = o.combine.wanted();

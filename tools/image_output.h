@@ -50,9 +50,10 @@ struct WrittenImage {
   bool cancelled = false;                      // nothing was written
 };
 
-// Runs the methods and writes the files. `attributes` of the estimates are those of the header. `threads` 0: all that
+// Runs the methods and writes the files. `attributes` of the estimates are those of the header; what the file says of
+// the methods is added to the estimates. `threads` 0: all that
 // the process may use. When `cancel` is set meanwhile, the files stay as they were. Throws Error(OutputFailed).
-WrittenImage writeImage(const ImageOutput& output, Estimates estimates, const Plane<float>* alpha, int threads,
+WrittenImage writeImage(const ImageOutput& output, Estimates& estimates, const Plane<float>* alpha, int threads,
                         const std::atomic<bool>* cancel = nullptr);
 
 // Calls `show` with what the estimates and the methods that ran on them hold.

@@ -66,24 +66,30 @@ std::string MemoryPlan::text() const {
     text += fmt::format("{}{} {}", separator, item.use, mebibytes(item.bytes));
     separator = ", ";
   }
+  if (combinedOnce < total())
+    text += fmt::format("; {} if nothing is combined before the end", mebibytes(combinedOnce));
   return text + '\n';
 }
 
 MemoryPlan planMemory(const Scene& scene, const Plan& plan, const Recipe& recipe, uint64_t samples) {
   const auto pixels = static_cast<uint64_t>(plan.window.width()) * static_cast<uint64_t>(plan.window.height());
   const Facts facts = plannedFacts(plan, samples);
+  const MemoryItem film{"film", pixels * (plan.filmBytesPerPixel + historyBytes(facts))};
+  const MemoryItem copy{"the copy that is published", pixels * static_cast<uint64_t>(estimatesMemory(facts))};
+  const int threads = plan.settings.threads > 0 ? plan.settings.threads : machineThreads();
+  const MemoryItem combining{"combining", pipelineMemory(recipe, facts, pixels, threads)};
+  const MemoryItem writing{"writing", writingBytes(plan, facts)};
   MemoryPlan memory;
   memory.items = {{"program", kProgram},
                   {"hierarchies", scene.accel().bytes()},
                   {"geometry", scene.geometryBytes()},
-                  {"textures", scene.textureBytes()},
-                  {"film", pixels * (plan.filmBytesPerPixel + historyBytes(facts))}};
+                  {"textures", scene.textureBytes()}};
   for (const PlannedIntegrator& p : plan.integrators)
     memory.items.push_back({std::string(p.integrator->name()) + " passes", p.integrator->workingMemory(plan).bytes});
-  memory.items.push_back({"the copy that is published", pixels * static_cast<uint64_t>(estimatesMemory(facts))});
-  const int threads = plan.settings.threads > 0 ? plan.settings.threads : machineThreads();
-  const MemoryItem combining{"combining", pipelineMemory(recipe, facts, pixels, threads)};
-  const MemoryItem writing{"writing", writingBytes(plan, facts)};
+  const uint64_t always = memory.total();
+  memory.combinedOnce = always + copy.bytes + std::max(film.bytes + writing.bytes, combining.bytes);
+  memory.items.push_back(film);
+  memory.items.push_back(copy);
   memory.items.push_back(combining.bytes > writing.bytes ? combining : writing);
   return memory;
 }

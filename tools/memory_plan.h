@@ -19,8 +19,12 @@ struct MemoryItem {
 
 struct MemoryPlan {
   std::vector<MemoryItem> items;  // all held at once when memory is at its peak
+  // The peak when nothing is combined before the end: at the end the film makes room for combiners. As much as total()
+  // where nothing is combined at all.
+  uint64_t combinedOnce = 0;
   uint64_t total() const;
-  // "memory: 1018 MiB at most: film 313 MiB, ...": one line, the largest first, nothing for items of less than 0.1 MiB.
+  // "memory: 1018 MiB at most: film 313 MiB, ...": one line, the largest first, nothing for items of less than 0.1 MiB;
+  // and combinedOnce, if that is less.
   std::string text() const;
 };
 

@@ -98,29 +98,28 @@ int runMerge(const MergeOptions& o) {
     removeAbandoned(file);
   }
 
-  const FilmState state = sumOf(sortedParts(o.parts, o.quiet));
-  const EstimateState& first = state.estimates.front();
-  if (first.passes.empty()) throw Error(ExitCode::BadInput, o.parts.front() + ": holds no passes yet");
+  FilmState state = sumOf(sortedParts(o.parts, o.quiet));
+  const std::vector<PassInterval> passes = state.estimates.front().passes;
+  const uint64_t samples = state.estimates.front().sums.passes();
+  if (passes.empty()) throw Error(ExitCode::BadInput, o.parts.front() + ": holds no passes yet");
   if (!o.checkpoint.empty()) writeStateFile(o.checkpoint, state);
   WrittenImage written;
   if (!o.image.files().empty()) {
-    Estimates estimates = estimatesOf(state, true);
+    Estimates estimates = describedEstimates(state, true, !o.image.noTiming);
     requireInputs(estimates, o.image.combine);
-    estimates.attributes = state.attributes;
-    for (Attribute& a : passAttributes(estimates, state.seconds, !o.image.noTiming))
-      estimates.attributes.push_back(std::move(a));
     const std::optional<Plane<float>> alpha =
         state.coverage ? std::optional(state.coverage->mean()) : std::optional<Plane<float>>();
-    written = writeImage(o.image, std::move(estimates), alpha ? &*alpha : nullptr, o.threads);
+    state = {};  // what it held is what combiners take
+    written = writeImage(o.image, estimates, alpha ? &*alpha : nullptr, o.threads);
   }
   if (o.quiet) return 0;
   for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
   for (const std::string& text : written.timings) fmt::print(stderr, "{}\n", text);
   for (const std::string& file : outputs) fmt::print(stderr, "Saved: {}\n", file);
   std::string intervals;
-  for (const PassInterval& i : first.passes)
+  for (const PassInterval& i : passes)
     intervals += fmt::format("{}{}:{}", intervals.empty() ? "" : " and ", i.begin, i.end);
-  fmt::print(stderr, "{} spp of {} shares, passes {}{}\n", first.sums.passes(), o.parts.size(), intervals,
+  fmt::print(stderr, "{} spp of {} shares, passes {}{}\n", samples, o.parts.size(), intervals,
              written.error ? fmt::format(", estimated error {:.3g}", *written.error) : "");
   return 0;
 }

@@ -144,7 +144,8 @@ WrittenImage save(const PreviewOptions& o, const Session& session, const RunRepo
   audience.board().setPhase(PreviewPhase::Saving);
   ImageOutput output = o.image;
   output.show = [&](const ImageViews& v) { audience.show(result.spp, result.seconds, v); };
-  return writeImage(output, describedEstimates(session, !o.image.noTiming), nullptr, o.samples.threads);
+  Estimates estimates = describedEstimates(session, !o.image.noTiming);
+  return writeImage(output, estimates, nullptr, o.samples.threads);
 }
 
 int runPreview(PreviewOptions o) {

@@ -64,7 +64,7 @@ bool BackgroundJob::collect(std::exception_ptr& failure) {
   return true;
 }
 
-Publisher::Publisher(PublishOptions options, const Session& session)
+Publisher::Publisher(PublishOptions options, Session& session)
     : options_(std::move(options)),
       combines_(!options_.image.combine.wanted().empty() || !options_.image.combine.denoisers.empty()),
       session_(session),
@@ -78,13 +78,6 @@ Publisher::~Publisher() {
   cancel_ = true;
   imageJob_.wait();
   stateJob_.wait();
-}
-
-Estimates describedEstimates(const Session& session, bool timing) {
-  Estimates e = session.estimates();
-  e.attributes = session.state().attributes;
-  for (Attribute& a : passAttributes(e, session.state().seconds, timing)) e.attributes.push_back(std::move(a));
-  return e;
 }
 
 void Publisher::fail(std::vector<Publication>& news, const std::exception_ptr& failure, const Publication& of) {
@@ -142,7 +135,7 @@ void Publisher::publishImage(const Progress& p, bool combined) {
   imageJob_.start([this, output, shown, alpha] {
     const Stopwatch job;
     try {
-      pending_.image = writeImage(*output, std::move(*shown), *alpha ? &**alpha : nullptr, helpers_, &cancel_);
+      pending_.image = writeImage(*output, *shown, *alpha ? &**alpha : nullptr, helpers_, &cancel_);
     } catch (...) {
       took_ = job.seconds();
       throw;
@@ -169,35 +162,44 @@ std::vector<Publication> Publisher::round(const Progress& p) {
   return news;
 }
 
-WrittenImage Publisher::writeNow(const ImageOutput& output) {
-  const std::optional<Plane<float>> alpha = session_.alpha();
-  return writeImage(output, describedEstimates(session_, !output.noTiming), alpha ? &*alpha : nullptr,
-                    options_.threads);
+WrittenImage Publisher::writeLast(Estimates estimates, const std::optional<Plane<float>>& alpha) {
+  const Plane<float>* coverage = alpha ? &*alpha : nullptr;
+  const std::vector<Attribute> attributes = estimates.attributes;
+  const size_t count = estimates.estimates.size();
+  try {
+    return writeImage(options_.image, estimates, coverage, options_.threads);
+  } catch (const std::bad_alloc&) {
+    if (!combines_) throw;
+  }
+  // Without what may have been added for the combined file.
+  estimates.attributes = attributes;
+  estimates.estimates.resize(std::min(count, estimates.estimates.size()));
+  writeImage(withoutCombining(options_.image), estimates, coverage, options_.threads);
+  throw Error(ExitCode::OutOfMemory,
+              "out of memory while combining; the image was saved without it: combine its file elsewhere (braid "
+              "combine), or lower --size");
 }
 
 WrittenImage Publisher::finish() {
   cancel_ = true;
   imageJob_.wait();
   stateJob_.wait();
+  FilmState film = session_.release();
   std::exception_ptr failure;
   if (!options_.checkpoint.empty()) {
     try {
-      writeStateFile(options_.checkpoint, session_.state());
+      writeStateFile(options_.checkpoint, film);
     } catch (const Error&) {
       failure = std::current_exception();
     }
   }
   WrittenImage written;
   if (hasImage()) {
-    try {
-      written = writeNow(options_.image);
-    } catch (const std::bad_alloc&) {
-      if (!combines_) throw;
-      writeNow(withoutCombining(options_.image));
-      throw Error(ExitCode::OutOfMemory,
-                  "out of memory while combining; the image was saved without it: combine its file elsewhere (braid "
-                  "combine), or lower --size");
-    }
+    Estimates estimates = describedEstimates(film, session_.plan().settings.quarters, !options_.image.noTiming);
+    const std::optional<Plane<float>> alpha =
+        film.coverage ? std::optional(film.coverage->mean()) : std::optional<Plane<float>>();
+    film = {};  // what it held is what combiners take
+    written = writeLast(std::move(estimates), alpha);
   }
   if (failure) std::rethrow_exception(failure);
   return written;

@@ -55,12 +55,9 @@ struct Publication {
   std::string failure;  // one line, told once for each cause; the render goes on
 };
 
-// The estimates of a session with the header of an image file; `timing`: also seconds, which differ between runs.
-Estimates describedEstimates(const Session& session, bool timing);
-
 class Publisher {
  public:
-  Publisher(PublishOptions options, const Session& session);
+  Publisher(PublishOptions options, Session& session);
   // Waits for what is being written; a combiner at work is cancelled.
   ~Publisher();
 
@@ -71,8 +68,8 @@ class Publisher {
   // For Session::run(): the published error met the target.
   const std::atomic<bool>& reached() const { return reached_; }
 
-  // After the run: saves the state and the final image. Both are tried; throws Error(OutputFailed) of the first that
-  // failed.
+  // After the run: saves the state and the final image, for which the film makes room. Both are tried; throws
+  // Error(OutputFailed) of the first that failed.
   WrittenImage finish();
 
  private:
@@ -81,12 +78,12 @@ class Publisher {
   void saveState(const Progress& progress, std::vector<Publication>& news);
   void publishImage(const Progress& progress, bool combined);
   void giveUpIfTooLong(const Progress& progress);
-  WrittenImage writeNow(const ImageOutput& output);
+  WrittenImage writeLast(Estimates estimates, const std::optional<Plane<float>>& alpha);
   bool hasImage() const { return options_.image.show || !options_.image.files().empty(); }
 
   const PublishOptions options_;
   const bool combines_;
-  const Session& session_;
+  Session& session_;
   PublicationSchedule schedule_;
   int helpers_ = 1;          // threads of a publication
   double machineShare_ = 1;  // of the machine that they are

@@ -81,6 +81,8 @@ class Session {
   Estimates estimates() const;
   std::optional<Plane<float>> alpha() const;
   const FilmState& state() const { return film_; }
+  // After the last run: hands out everything that was gathered, so that its memory can be given back.
+  FilmState release() { return std::move(film_); }
 
   // Completes what tells states apart with what the session cannot know, before resume(): the version and build of
   // braid, options that change the scene; and what image headers say of it.
