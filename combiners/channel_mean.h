@@ -11,7 +11,7 @@ namespace braid {
 // (map(i, 0) + map(i, 1) + map(i, 2)) / 3 for every pixel i of an image of this size.
 template <class Map>
 Plane<float> channelMean(int width, int height, const Map& map) {
-  Plane<float> out(width, height);
+  Plane<float> out(width, height, kUnfilled);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i)
       out[i] = finiteFloat((map(i, size_t(0)) + map(i, size_t(1)) + map(i, size_t(2))) / 3);

@@ -213,7 +213,7 @@ WeightMaps ensembleWeights(const Estimate& unbiased, const std::vector<const Est
 }
 
 Rgb<float> weightedImage(const WeightMaps& weights, const std::vector<const Rgb<float>*>& images) {
-  Rgb<float> out(images[0]->width(), images[0]->height());
+  Rgb<float> out(images[0]->width(), images[0]->height(), kUnfilled);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     std::vector<double> sum(end - begin);
     runVectorised([&] {

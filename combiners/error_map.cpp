@@ -39,7 +39,7 @@ Rgb<float> meanVariance(const Estimate& e) {
 bool hasHalves(const Estimate& e) { return !e.half[0].empty() && !e.half[1].empty(); }
 
 Rgb<float> halfVariance(const Estimate& x, const Rgb<float>& variance, int h) {
-  Rgb<float> out(variance.width(), variance.height());
+  Rgb<float> out(variance.width(), variance.height(), kUnfilled);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t c = 0; c < 3; ++c)
       for (size_t i = begin; i < end; ++i) {
@@ -79,7 +79,7 @@ Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, c
   });
   noise = boxMean(noise, 1);
   bias = boxMean(bias, 7);
-  Plane<float> out(width, height);
+  Plane<float> out(width, height, kUnfilled);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) out[i] = finiteFloat(unit[i] * (noise[i] + std::max(0.0, bias[i])));
   });

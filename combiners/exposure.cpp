@@ -63,7 +63,7 @@ bool onlyMultiplied(const float* in, size_t count, const Change& change, float* 
 }
 
 Plane<float> changed(const Plane<float>& in, const Change& change, SanitiseReport& report) {
-  Plane<float> out(in.width, in.height);
+  Plane<float> out(in.width, in.height, kUnfilled);
   report += parallelSum(in.size(), kPixelChunk, SanitiseReport{}, [&](size_t begin, size_t end) {
     SanitiseReport part;
     if (onlyMultiplied(&in[begin], end - begin, change, &out[begin])) return part;

@@ -10,7 +10,7 @@ namespace braid {
 // The plane with `radius` mirrored pixels around it.
 template <class T>
 Plane<T> mirrorPadded(const Plane<T>& in, int radius) {
-  Plane<T> out(in.width + 2 * radius, in.height + 2 * radius);
+  Plane<T> out(in.width + 2 * radius, in.height + 2 * radius, kUnfilled);
   parallelRows(out.height, [&](int y) {
     const T* from = in.data.data() + in.index(0, mirrorIndex(y - radius, in.height));
     T* to = out.data.data() + out.index(0, y);

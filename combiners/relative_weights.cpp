@@ -25,7 +25,7 @@ Plane<float> relativeErrorRoots(const Rgb<float>& guide, const Rgb<float>& varia
   const Plane<double> around = boxMean(own, 1);
   const Plane<float> noise =
       channelMean(variance, [&](size_t i, size_t c) { return static_cast<double>(variance[c][i]); });
-  Plane<float> out(guide.width(), guide.height());
+  Plane<float> out(guide.width(), guide.height(), kUnfilled);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const double level = 0.5 * (static_cast<double>(own[i]) + around[i]);

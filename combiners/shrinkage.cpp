@@ -72,7 +72,7 @@ Plane<double> numerators(const Plane<double>& variance, const JamesSteinSettings
 
 // One over what a squared difference is measured in.
 Plane<float> inverseUnits(const Plane<float>& variance) {
-  Plane<float> out(variance.width, variance.height);
+  Plane<float> out(variance.width, variance.height, kUnfilled);
   forAll(out.size(), [&](size_t i) { out[i] = std::sqrt(std::sqrt(variance[i])); });
   const Plane<double> roots = mirrorBoxMean(out, 3);
   forAll(out.size(), [&](size_t i) {
@@ -127,9 +127,11 @@ void addTerms(const float* __restrict x, const float* __restrict y, const float*
 // Of the channels [first, first + together), averaged; nothing of gated pixels.
 Terms termsOf(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale& scale, const Rgb<float>& y,
               size_t first, size_t together) {
-  Terms out{Plane<double>(x.width(), x.height()), Plane<double>(x.width(), x.height())};
+  Terms out{Plane<double>(x.width(), x.height(), kUnfilled), Plane<double>(x.width(), x.height(), kUnfilled)};
   const double weight = 1.0 / static_cast<double>(together);
   parallelChunks(x.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    std::fill_n(&out.squares[begin], end - begin, 0.0);
+    std::fill_n(&out.noise[begin], end - begin, 0.0);
     for (size_t c = first; c < first + together; ++c) {
       const float* unit = scale.inverseUnit[c].empty() ? nullptr : &scale.inverseUnit[c][begin];
       runVectorised([&] {
@@ -154,7 +156,7 @@ void blendRow(const float* __restrict x, const float* __restrict y, const double
 
 void keepFactors(const Plane<double>& factor, size_t firstChannel, size_t lastChannel, Rgb<float>& out) {
   for (size_t c = firstChannel; c < lastChannel; ++c) {
-    out[c] = Plane<float>(factor.width, factor.height);
+    out[c] = Plane<float>(factor.width, factor.height, kUnfilled);
     forAll(factor.size(), [&](size_t i) { out[c][i] = finiteFloat(factor[i]); });
   }
 }
@@ -180,7 +182,8 @@ NoiseScale noiseScale(const Rgb<float>& variance, const JamesSteinSettings& sett
 // many make sqrt(k)). The deviation around is the square of the mean root, so that a dozen outliers in a window do not
 // hide each other.
 Plane<float> outlierGate(const Rgb<float>& variance, int radius) {
-  Plane<float> deviation(variance.width(), variance.height()), roots(variance.width(), variance.height());
+  Plane<float> deviation(variance.width(), variance.height(), kUnfilled),
+      roots(variance.width(), variance.height(), kUnfilled);
   forAll(roots.size(), [&](size_t i) {
     double v = 0;
     for (size_t c = 0; c < 3; ++c) v += static_cast<double>(variance[c][i]) / 3;
@@ -211,7 +214,7 @@ ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const No
                        const JamesSteinSettings& settings, const std::array<Plane<double>, 3>* least) {
   BRAID_ASSERT(!least || !settings.global);
   ShrunkImage out;
-  out.image = Rgb<float>(x.width(), x.height());
+  out.image = Rgb<float>(x.width(), x.height(), kUnfilled);
   const size_t together = settings.shared ? 3 : 1;
   for (size_t first = 0; first < 3; first += together) {
     const Terms terms = termsOf(x, variance, scale, y, first, together);

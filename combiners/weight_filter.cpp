@@ -22,7 +22,7 @@ constexpr float exponentScale(float sigma) { return kLog2E / (2 * sigma * sigma)
 
 // V and the share of eps of every pixel.
 Plane<float> guideVariance(const Estimate& guide) {
-  Plane<float> out(guide.mean.width(), guide.mean.height());
+  Plane<float> out(guide.mean.width(), guide.mean.height(), kUnfilled);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       double v = 0, square = 0;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Memory of image planes. The first touch of memory costs more than most loops over it: large buffers come from the
 // system as zeros, so that the loop that fills them touches them first, on all threads, and in huge pages where the
-// system has any. What else touches them whole, copies and fills, does so in parallel.
+// system has any. What else touches them whole, copies and fills, does so in parallel. A few buffers that were freed
+// are kept for the next ones of their size: filters make and drop planes of one size all the time.
 #pragma once
 
 #include <algorithm>
@@ -17,8 +18,15 @@ namespace braid {
 // Bytes from which on a buffer is mapped by itself instead of taken from the heap.
 constexpr size_t kMappedBytes = size_t(1) << 20;
 
-// Memory that holds zeros, aligned to 64 bytes. Throws std::bad_alloc.
-void* allocatePixels(size_t bytes);
+// Bytes of freed buffers that are kept at most.
+constexpr size_t kKeptBytes = size_t(64) << 20;
+
+// For buffers of which the next loop writes every value.
+struct Unfilled {};
+inline constexpr Unfilled kUnfilled;
+
+// Memory aligned to 64 bytes that holds zeros, or anything. Throws std::bad_alloc.
+void* allocatePixels(size_t bytes, bool zeros);
 void freePixels(void* memory, size_t bytes) noexcept;
 
 // So many values of a plain type, all the same at first; owned, and copied with it.
@@ -30,10 +38,11 @@ class PixelBuffer {
   using value_type = T;
 
   PixelBuffer() = default;
-  PixelBuffer(size_t size, T value) : data_(static_cast<T*>(allocatePixels(size * sizeof(T)))), size_(size) {
+  PixelBuffer(size_t size, Unfilled) : PixelBuffer(size, Zeros{false}) {}
+  PixelBuffer(size_t size, const T& value) : PixelBuffer(size, Zeros{isZero(value)}) {
     if (!isZero(value)) inParallel([&](size_t begin, size_t end) { std::fill(data_ + begin, data_ + end, value); });
   }
-  PixelBuffer(const PixelBuffer& other) : PixelBuffer(other.size_, T{}) { copy(other); }
+  PixelBuffer(const PixelBuffer& other) : PixelBuffer(other.size_, kUnfilled) { copy(other); }
   PixelBuffer(PixelBuffer&& other) noexcept { swap(other); }
   PixelBuffer& operator=(const PixelBuffer& other) {
     if (this == &other) return *this;
@@ -70,6 +79,12 @@ class PixelBuffer {
   }
 
  private:
+  struct Zeros {
+    bool wanted;
+  };
+  PixelBuffer(size_t size, Zeros zeros)
+      : data_(static_cast<T*>(allocatePixels(size * sizeof(T), zeros.wanted))), size_(size) {}
+
   static bool isZero(const T& value) {
     const T zero{};
     return std::memcmp(&value, &zero, sizeof(T)) == 0;

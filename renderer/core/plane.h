@@ -23,6 +23,8 @@ struct Plane {
   Plane() = default;
   Plane(int w, int h, T value = T{})
       : width(w), height(h), data(static_cast<size_t>(w) * static_cast<size_t>(h), value) {}
+  Plane(int w, int h, Unfilled unfilled)
+      : width(w), height(h), data(static_cast<size_t>(w) * static_cast<size_t>(h), unfilled) {}
 
   size_t size() const { return data.size(); }
   bool empty() const { return data.empty(); }
@@ -42,6 +44,9 @@ struct Rgb {
 
   Rgb() = default;
   Rgb(int w, int h, T value = T{}) : channel{Plane<T>(w, h, value), Plane<T>(w, h, value), Plane<T>(w, h, value)} {}
+
+  Rgb(int w, int h, Unfilled unfilled)
+      : channel{Plane<T>(w, h, unfilled), Plane<T>(w, h, unfilled), Plane<T>(w, h, unfilled)} {}
 
   int width() const { return channel[0].width; }
   int height() const { return channel[0].height; }

@@ -146,7 +146,7 @@ class BoxSummer {
 // Sums over windows of (2 radius + 1)² pixels, times `scale`. The same bits for any number of threads.
 template <class T>
 Plane<double> boxSum(const Plane<T>& in, int radius, WindowBorder border = WindowBorder::Clamped, double scale = 1) {
-  Plane<double> out(in.width, in.height);
+  Plane<double> out(in.width, in.height, kUnfilled);
   if (in.empty()) return out;
   const int blocks = box_sum_detail::BoxSummer<T>::blocks(in.height, radius, border),
             together = std::max(1, 64 / (2 * radius + 1));

@@ -78,7 +78,7 @@ Plane<float> FeatureAccumulator::halfMean(int component, int half) const {
 Plane<float> FeatureAccumulator::variance(int component) const {
   const auto c = static_cast<size_t>(component);
   const Plane<double>& a = sum_[0][c];
-  Plane<float> out(a.width, a.height);
+  Plane<float> out(a.width, a.height, kUnfilled);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i)
       out[i] = floatVarianceOfMean(a[i] + sum_[1][c][i], sumsq_[c][i], passes());
