@@ -245,20 +245,28 @@ int runCombiningBench(const BenchOptions& o, const Settings& settings) {
   return 0;
 }
 
+void tellPublishing(const std::string& scene, const Settings& settings, const nlohmann::json& r) {
+  const auto number = [&](const char* name) { return r[name].get<double>(); };
+  const double seconds = number("publishedSeconds");
+  const auto percent = [&](double part) { return 100 * part / seconds; };
+  fmt::print(
+      "{}: {}x{}, {} spp: {:.2f} s, with {:.1f} publications ({:.1f} combined) {:.2f} s: {:+.1f} %, of processor time "
+      "{:+.1f} %; publishing and combining take {:.1f} % of it: {:.1f} on the way, {:.1f} the last combining, {:.1f} "
+      "its "
+      "larger file\n",
+      scene, settings.width, settings.height, settings.spp, number("seconds"), number("publications"),
+      number("combinedPublications"), seconds, 100 * number("overhead"), 100 * number("processorOverhead"),
+      100 * number("share"), percent(number("publishingSeconds")), percent(number("lastCombineSeconds")),
+      percent(std::max(0.0, number("lastWriteSeconds") - number("plainWriteSeconds"))));
+}
+
 // What is published while a render goes on and combined at its end, against the passes and a plain file.
 int runPublishingBench(const BenchOptions& o, const Settings& settings) {
   nlohmann::json all = nlohmann::json::array();
   for (const SceneSource& source : sourcesOf(o)) {
     const auto [scene, camera] = openScene(source, o);
     nlohmann::json r = benchPublishing(*scene, camera, settings, o.publish, o.repeats);
-    if (!o.json)
-      fmt::print(
-          "{}: {}x{}, {} spp: {:.2f} s, with {:.1f} publications ({:.1f} combined) {:.2f} s: {:+.1f} %, "
-          "the last combining {:.1f} %; of processor time {:+.1f} %\n",
-          source.name, settings.width, settings.height, settings.spp, r["seconds"].get<double>(),
-          r["publications"].get<double>(), r["combinedPublications"].get<double>(), r["publishedSeconds"].get<double>(),
-          100 * r["overhead"].get<double>(), 100 * r["lastCombineSeconds"].get<double>() / r["seconds"].get<double>(),
-          100 * r["processorOverhead"].get<double>());
+    if (!o.json) tellPublishing(source.name, settings, r);
     r["scene"] = source.name;
     all.push_back(std::move(r));
   }

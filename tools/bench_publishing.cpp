@@ -22,6 +22,7 @@ namespace {
 
 struct Cost {
   double seconds = 0, processor = 0;
+  double publishing = 0, combining = 0, writing = 0;  // seconds of the run: on the way, and at its end
 };
 
 template <class Task>
@@ -29,7 +30,10 @@ Cost costOf(const Task& task) {
   const Stopwatch clock;
   const std::clock_t begin = std::clock();
   task();
-  return {clock.seconds(), static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC};
+  Cost cost;
+  cost.seconds = clock.seconds();
+  cost.processor = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  return cost;
 }
 
 Cost median(std::vector<Cost> costs) {
@@ -37,7 +41,8 @@ Cost median(std::vector<Cost> costs) {
     std::sort(costs.begin(), costs.end(), [&](const Cost& a, const Cost& b) { return a.*part < b.*part; });
     return costs[costs.size() / 2].*part;
   };
-  return {middle(&Cost::seconds), middle(&Cost::processor)};
+  return {middle(&Cost::seconds), middle(&Cost::processor), middle(&Cost::publishing), middle(&Cost::combining),
+          middle(&Cost::writing)};
 }
 
 class TemporaryFile {
@@ -76,8 +81,10 @@ nlohmann::json benchPublishing(const Scene& scene, const CameraData& camera, con
       plain.combine.combine = "none";
       const std::optional<Plane<float>> alpha = session.alpha();
       Estimates estimates = describedEstimates(session, true);
-      writeImage(plain, estimates, alpha ? &*alpha : nullptr, settings.threads);
+      last = writeImage(plain, estimates, alpha ? &*alpha : nullptr, settings.threads);
     }));
+    alone.back().writing = last.writeSeconds;
+    double spent = 0;
     published.push_back(costOf([&] {
       Session session(scene, plan);
       Publisher publisher(options, session);
@@ -89,16 +96,24 @@ nlohmann::json benchPublishing(const Scene& scene, const CameraData& camera, con
         return true;
       });
       last = publisher.finish();
+      spent = publisher.spent();
     }));
+    published.back().publishing = spent;
+    published.back().combining = last.combineSeconds;
+    published.back().writing = last.writeSeconds;
   }
   const Cost a = median(alone), p = median(published);
+  const double more = p.publishing + p.combining + std::max(0.0, p.writing - a.writing);
   return {{"spp", settings.spp},
           {"methods", methods},
           {"seconds", a.seconds},
           {"publishedSeconds", p.seconds},
           {"overhead", p.seconds / a.seconds - 1},
-          {"lastCombineSeconds", last.combineSeconds},
-          {"lastWriteSeconds", last.writeSeconds},
+          {"share", more / p.seconds},
+          {"publishingSeconds", p.publishing},
+          {"lastCombineSeconds", p.combining},
+          {"lastWriteSeconds", p.writing},
+          {"plainWriteSeconds", a.writing},
           {"processorSeconds", a.processor},
           {"publishedProcessorSeconds", p.processor},
           {"processorOverhead", p.processor / a.processor - 1},

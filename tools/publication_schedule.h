@@ -50,6 +50,9 @@ class PublicationSchedule {
   bool tooLong(const Progress& progress, double cost) const;
   void givenUp(double cost);
 
+  // What everything that is out or was given up has cost, in seconds of the whole machine.
+  double spent() const { return plainSpent_ + combinedSpent_; }
+
   // Whether a published error met the target.
   bool reached() const { return reached_; }
 

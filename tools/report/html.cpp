@@ -2,6 +2,7 @@
 #include "tools/report/html.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -23,10 +24,17 @@ std::string headerRow(const std::vector<std::string>& names) {
   return row + "</tr>\n";
 }
 
-// Overall: ratios, gains at three times, score, pixels better than the input.
+// Overall: ratios, gains at three times (those that the ladder reaches down to), score, pixels better than the input.
 std::string overallTable(const SweepSummary& s) {
-  std::string t = "<table>\n" + headerRow({"method", "error ratio", "time ratio", "gain at T", "gain at T/4",
-                                           "gain at T/16", "score", "better pixels"});
+  const std::array<const char*, 3> times{"gain at T", "gain at T/4", "gain at T/16"};
+  const auto known = [&](size_t time) {
+    return std::any_of(s.overall.begin(), s.overall.end(), [&](const auto& o) { return o.gains[time].has_value(); });
+  };
+  std::vector<std::string> names{"method", "error ratio", "time ratio"};
+  for (size_t time = 0; time < times.size(); ++time)
+    if (known(time)) names.push_back(times[time]);
+  names.insert(names.end(), {"score", "better pixels"});
+  std::string t = "<table>\n" + headerRow(names);
   for (const OverallSummary& o : s.overall) {
     const auto counted = [&](const std::optional<double>& v, int n) {
       const bool all = static_cast<size_t>(n) == s.scenes.size() || !v;
@@ -34,7 +42,8 @@ std::string overallTable(const SweepSummary& s) {
     };
     t +=
         "<tr>" + cell(o.method) + cell(counted(o.errorRatio, o.errorScenes)) + cell(counted(o.timeRatio, o.timeScenes));
-    for (const auto& g : o.gains) t += cell(shortNumber(g));
+    for (size_t time = 0; time < times.size(); ++time)
+      if (known(time)) t += cell(shortNumber(o.gains[time]));
     t += cell(fmt::format("{:.2f}", o.score));
     t += cell(o.betterPixels ? fmt::format("{:.1f} %", 100 * *o.betterPixels) : "–") + "</tr>\n";
   }
