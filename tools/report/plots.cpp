@@ -22,6 +22,9 @@ namespace {
 constexpr std::array<const char*, 8> kColours = {"#000000", "#0072b2", "#d55e00", "#009e73",
                                                  "#cc79a7", "#e69f00", "#56b4e9", "#8c6d31"};
 
+// Points and dashes of the methods after the first, second, ... eight, which have the same colours again.
+constexpr std::array<const char*, 4> kMarks = {"pt 7 dt 1", "pt 5 dt 2", "pt 9 dt 4", "pt 13 dt 5"};
+
 struct Range {
   double lo = INFINITY, hi = -INFINITY;
   void extend(double v) {
@@ -97,8 +100,9 @@ std::string plotCommand(const Plot& plot) {
           "  {} index {} using {}:4:5 with filledcurves fc rgb '{}' fs transparent solid 0.18 noborder "
           "notitle, \\\n",
           file, block, x, colour);
-    lines += fmt::format("  {} index {} using {}:3 with linespoints lw 2 pt 7 ps 0.6 lc rgb '{}' title {}, \\\n", file,
-                         block, x, colour, quoted(name));
+    const char* mark = kMarks[i / kColours.size() % kMarks.size()];
+    lines += fmt::format("  {} index {} using {}:3 with linespoints lw 2 {} ps 0.6 lc rgb '{}' title {}, \\\n", file,
+                         block, x, mark, colour, quoted(name));
     if (guide.empty() && curve.front().error > 0)
       guide = fmt::format("  {:.6g}*{:.6g}/x with lines dt 2 lw 1 lc rgb '#888888' title 'slope -1', \\\n",
                           curve.front().error, xOf(plot, curve.front()));
@@ -106,6 +110,20 @@ std::string plotCommand(const Plot& plot) {
   std::string all = bands + guide + lines;
   all.erase(all.rfind(", \\"));
   return "plot \\\n" + all + "\n";
+}
+
+// Of the SVG, in pixels: the key stands beside the curves, whatever the number and the length of its names.
+struct Canvas {
+  int width = 720, height = 500;
+};
+
+Canvas canvasOf(const Plot& plot) {
+  size_t longest = 0;
+  for (const auto& [name, curve] : plot.series) longest = std::max(longest, name.size());
+  Canvas canvas;
+  canvas.width = std::max(canvas.width, 580 + 8 * static_cast<int>(longest));
+  canvas.height = std::max(canvas.height, 90 + 16 * static_cast<int>(plot.series.size() + 1));
+  return canvas;
 }
 
 std::string scriptText(const Plot& plot, const Range& x, const Range& y) {
@@ -118,12 +136,12 @@ std::string scriptText(const Plot& plot, const Range& x, const Range& y) {
       plot.name, quoted(plot.title), quoted(plot.xLabel), quoted(plot.yLabel), x.lo, x.hi, y.lo, y.hi,
       plot.versusSeconds ? decimalTics(x) : binaryTics(x), decimalTics(y));
   const std::string command = plotCommand(plot);
-  s += fmt::format(
-      "set terminal svg size 720,500 dynamic font 'DejaVu Sans,13' background rgb 'white'\nset output {}\n{}",
-      quoted(plot.name + ".svg"), command);
+  const Canvas canvas = canvasOf(plot);
   s +=
-      fmt::format("set terminal pngcairo size 1080,750 font 'DejaVu Sans,14' background rgb 'white'\nset output {}\n{}",
-                  quoted(plot.name + ".png"), command);
+      fmt::format("set terminal svg size {},{} dynamic font 'DejaVu Sans,13' background rgb 'white'\nset output {}\n{}",
+                  canvas.width, canvas.height, quoted(plot.name + ".svg"), command);
+  s += fmt::format("set terminal pngcairo size {},{} font 'DejaVu Sans,14' background rgb 'white'\nset output {}\n{}",
+                   canvas.width * 3 / 2, canvas.height * 3 / 2, quoted(plot.name + ".png"), command);
   return s + "set output\n";
 }
 
