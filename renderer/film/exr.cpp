@@ -5,10 +5,13 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <limits>
 #include <utility>
 #include <vector>
 
+#include <OpenImageIO/half.h>
 #include <OpenImageIO/imageio.h>
 
 #include "renderer/core/error.h"
@@ -172,24 +175,40 @@ OIIO::ImageSpec makeSpec(const Estimates& estimates, const std::vector<ExrChanne
   return spec;
 }
 
-// Copies rows [begin, end) of all planes, interleaved; returns how many values had to be clamped to the range of half
+size_t bytesOf(const ExrChannel& channel) { return channel.half ? sizeof(half) : sizeof(float); }
+
+// Copies a row of a plane to every `stride`-th byte; returns how many values had to be clamped to the range of half
 // floats.
-uint64_t interleave(const std::vector<ExrChannel>& channels, int begin, int end, std::vector<float>& out) {
+uint64_t interleaveRow(const ExrChannel& channel, int y, size_t stride, std::byte* to) {
+  const auto width = static_cast<size_t>(channel.plane->width);
+  const float* in = &channel.plane->at(0, y);
+  if (!channel.half) {
+    for (size_t x = 0; x < width; ++x) std::memcpy(to + x * stride, in + x, sizeof(float));
+    return 0;
+  }
+  uint64_t clamped = 0;
+  for (size_t x = 0; x < width; ++x) {
+    const bool large = std::fabs(in[x]) > kHalfMax;
+    const half value(large ? std::copysign(kHalfMax, in[x]) : in[x]);
+    std::memcpy(to + x * stride, &value, sizeof(half));
+    clamped += large;
+  }
+  return clamped;
+}
+
+// Copies rows [begin, end) of all planes, interleaved and in the types of the file: what OpenImageIO would have to
+// convert it copies value by value, on one thread. Returns how many values had to be clamped.
+uint64_t interleave(const std::vector<ExrChannel>& channels, int begin, int end, std::vector<std::byte>& out) {
   std::atomic<uint64_t> clamped{0};
-  const size_t count = channels.size(), width = static_cast<size_t>(channels[0].plane->width);
+  size_t stride = 0;
+  for (const ExrChannel& c : channels) stride += bytesOf(c);
+  const size_t rowBytes = stride * static_cast<size_t>(channels[0].plane->width);
   parallelRows(end - begin, [&](int row) {
     uint64_t clampedInRow = 0;
-    for (size_t c = 0; c < count; ++c) {
-      const float* in = &channels[c].plane->at(0, begin + row);
-      float* to = out.data() + static_cast<size_t>(row) * width * count + c;
-      for (size_t x = 0; x < width; ++x) {
-        float v = in[x];
-        if (channels[c].half && std::fabs(v) > kHalfMax) {
-          v = std::copysign(kHalfMax, v);
-          ++clampedInRow;
-        }
-        to[x * count] = v;
-      }
+    std::byte* to = out.data() + static_cast<size_t>(row) * rowBytes;
+    for (const ExrChannel& c : channels) {
+      clampedInRow += interleaveRow(c, begin + row, stride, to);
+      to += bytesOf(c);
     }
     clamped += clampedInRow;
   });
@@ -211,11 +230,11 @@ WriteReport writeExr(const std::string& path, const Estimates& estimates, const 
     if (!out) file.fail(OIIO::geterror());
     if (!out->set_ioproxy(&file)) file.fail("this OpenImageIO cannot write EXR through a stream");
     if (!out->open(file.temporaryPath(), spec)) file.fail(out->geterror());
-    std::vector<float> rows(static_cast<size_t>(kRowsPerWrite) * static_cast<size_t>(spec.width) * channels.size());
+    std::vector<std::byte> rows(static_cast<size_t>(kRowsPerWrite) * spec.scanline_bytes(true));
     for (int y = 0; y < spec.height; y += kRowsPerWrite) {
       const int end = std::min(spec.height, y + kRowsPerWrite);
       report.clampedToHalf += interleave(channels, y, end, rows);
-      if (!out->write_scanlines(spec.y + y, spec.y + end, 0, OIIO::TypeDesc::FLOAT, rows.data()))
+      if (!out->write_scanlines(spec.y + y, spec.y + end, 0, OIIO::TypeDesc::UNKNOWN, rows.data()))
         file.fail(out->geterror());
     }
     if (!out->close()) file.fail(out->geterror());
