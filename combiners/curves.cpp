@@ -46,7 +46,6 @@ const OptionInfo kMostRatio{"curves-most-ratio", 64, "Most passes that it counts
 // Before, variances are too uncertain for a curve.
 constexpr double kFewestPasses = 16;
 constexpr double kRelativeEpsilon = 1e-6;
-constexpr int kGateRadius = 7;
 
 class Curves : public StoppingMethod {
  public:

@@ -127,7 +127,6 @@ Prior makePrior(const MethodInputs& in, const Rgb<float>& variance, const Rgb<fl
   return prior;
 }
 
-constexpr int kGateRadius = 7;
 constexpr float kOutlierVariance = 1.0f / 25;  // of the variance of an outlier that was replaced
 
 // The mean and the halves of x without its lone outliers, whose variance is lowered.

@@ -51,6 +51,9 @@ struct NoiseScale {
 };
 NoiseScale noiseScale(const Rgb<float>& variance, const JamesSteinSettings& settings);
 
+// Of outlier gates in pixels, where a method has no blocks of its own.
+constexpr int kGateRadius = 7;
+
 // Where one sample carries a pixel of an image with this variance of the mean: the least mean squared difference from
 // another image that such a pixel contradicts; 0 elsewhere. Compared with windows of (2 radius + 1)² pixels.
 Plane<float> outlierGate(const Rgb<float>& variance, int radius);

@@ -251,9 +251,8 @@ void tellPublishing(const std::string& scene, const Settings& settings, const nl
   const auto percent = [&](double part) { return 100 * part / seconds; };
   fmt::print(
       "{}: {}x{}, {} spp: {:.2f} s, with {:.1f} publications ({:.1f} combined) {:.2f} s: {:+.1f} %, of processor time "
-      "{:+.1f} %; publishing and combining take {:.1f} % of it: {:.1f} on the way, {:.1f} the last combining, {:.1f} "
-      "its "
-      "larger file\n",
+      "{:+.1f} %; publishing and combining take {:.1f} % of it: "
+      "{:.1f} on the way, {:.1f} the last combining, {:.1f} its larger file\n",
       scene, settings.width, settings.height, settings.spp, number("seconds"), number("publications"),
       number("combinedPublications"), seconds, 100 * number("overhead"), 100 * number("processorOverhead"),
       100 * number("share"), percent(number("publishingSeconds")), percent(number("lastCombineSeconds")),

@@ -51,8 +51,8 @@ struct WrittenImage {
 };
 
 // Runs the methods and writes the files. `attributes` of the estimates are those of the header; what the file says of
-// the methods is added to the estimates. `threads` 0: all that
-// the process may use. When `cancel` is set meanwhile, the files stay as they were. Throws Error(OutputFailed).
+// the methods is added to the estimates. `threads` 0: all that the process may use. When `cancel` is set meanwhile, the
+// files stay as they were. Throws Error(OutputFailed).
 WrittenImage writeImage(const ImageOutput& output, Estimates& estimates, const Plane<float>* alpha, int threads,
                         const std::atomic<bool>* cancel = nullptr);
 

@@ -182,7 +182,9 @@ WrittenImage Publisher::writeLast(Estimates estimates, const std::optional<Plane
 
 WrittenImage Publisher::finish() {
   cancel_ = true;
+  const bool busy = !imageJob_.idle();
   imageJob_.wait();
+  if (busy) schedule_.spend(heldUp_ + took_ * machineShare_);
   stateJob_.wait();
   FilmState film = session_.release();
   std::exception_ptr failure;
