@@ -14,6 +14,10 @@
 // of the better input instead of 1.63, and below it in 25 cases of 42 instead of 11. Their noise falls as 1/I like all,
 // and then they contradict any image that is wrong.
 //
+// Maps are filtered relative to the squared level of the pixel (curves-relative; the paper: as they are), so that lamps
+// do not hide what is wrong in the dark around them: with nfor, over 14 scenes at 16 to 128 samples, the error is 0.97
+// of that of the better input instead of 1.07.
+//
 // Denoising may stop at some number of passes (in.stopped): d and its error are then those of the noisy image of that
 // time, with the features of now, while n and the curve are the newest. W never exceeds its value at the stop, so that
 // the share of d goes to 0 and the image converges like the noisy one. Variances of later passes may lower W; to let it
@@ -26,6 +30,7 @@
 #include "combiners/curves_stop.h"
 #include "combiners/denoise/variance.h"
 #include "combiners/finite_float.h"
+#include "combiners/map_filter.h"
 #include "combiners/registry.h"
 #include "combiners/shrinkage.h"
 #include "combiners/sure_map.h"
@@ -41,6 +46,7 @@ const OptionInfo kSlope{"curves-fallback-slope", -2, "Slope of pixels without a 
 const OptionInfo kPoints{"curves-points", 4, "Most points of a curve, 2 to 8; fewer: all pixels take the fallback"};
 const OptionInfo kMost{"curves-most", 65536, "Most passes that a denoised pixel counts"};
 const OptionInfo kGate{"curves-gate", 1, "1: lone outliers of the noisy image do not count; 0: the paper"};
+const OptionInfo kRelative{"curves-relative", 1, "1: pixels of a map count by their relative error; 0: the paper"};
 const OptionInfo kMostRatio{"curves-most-ratio", 64, "Most passes that it counts, per pass of the noisy image"};
 
 // Before, variances are too uncertain for a curve.
@@ -61,11 +67,11 @@ class Curves : public StoppingMethod {
     return needs;
   }
   MethodMemory memory(const MemoryCase& of) const override {
-    if (of.passes > 0 && of.passes < 4) return {90, 44};
-    return {123, 44, 0, 36};
+    if (of.passes > 0 && of.passes < 4) return {108, 44};
+    return {144, 44, 0, 36};
   }
   std::vector<OptionInfo> options() const override {
-    return {kStep, kSlope, kPoints, kMost, kMostRatio, kCurvesStop, kGate};
+    return {kStep, kSlope, kPoints, kMost, kMostRatio, kCurvesStop, kGate, kRelative};
   }
   uint64_t stop() const override { return stop_; }
   std::unique_ptr<Method> stoppedAfter(uint64_t passes) const override {
@@ -94,18 +100,15 @@ Rgb<float> squaredDifference(const Rgb<float>& a, const Rgb<float>& b) {
 }
 
 // SURE of the denoised image of n, filtered, without negative values.
-Rgb<float> errorOf(const MethodInputs& in, const Estimate& n, double sigma) {
+Rgb<float> errorOf(const MethodInputs& in, const Estimate& n, const MapFilter& filter) {
   const double step = std::clamp(in.options.number(kStep), 1e-3, 10.0);
-  const Rgb<float> sure = sureMap(n.mean, in.biased->mean, n.variance, in.seed, step, in.redenoise);
-  Rgb<float> error = gaussianFiltered(sure, sigma);
-  applySignRule(error, sure, n.variance);
-  return error;
+  return filter.risk(sureMap(n.mean, in.biased->mean, n.variance, in.seed, step, in.redenoise), n.variance);
 }
 
-Variances variancesOf(const MethodInputs& in, const Estimate& n, double sigma, size_t points) {
+Variances variancesOf(const MethodInputs& in, const Estimate& n, const MapFilter& filter, size_t points) {
   Variances v;
   v.passes = static_cast<double>(passesOf(n));
-  v.newest = gaussianFiltered(n.variance, sigma);
+  v.newest = filter(n.variance);
   if (!in.history || points < 2 || v.passes < kFewestPasses) return v;
   // The last points - 1 states between one pass, which has no variance, and the newest.
   std::vector<const Checkpoint*> kept;
@@ -114,7 +117,7 @@ Variances variancesOf(const MethodInputs& in, const Estimate& n, double sigma, s
       kept.push_back(&k);
   for (size_t k = kept.size() - std::min(kept.size(), points - 1); k < kept.size(); ++k) {
     v.earlierPasses.push_back(static_cast<double>(kept[k]->passes));
-    v.earlier.push_back(gaussianFiltered(kept[k]->variance, sigma));
+    v.earlier.push_back(filter(kept[k]->variance));
   }
   return v;
 }
@@ -166,11 +169,12 @@ MethodResult Curves::run(const MethodInputs& in) const {
   if (!in.redenoise) throw Error(ExitCode::Usage, "needs a denoiser that it can run again as its biased input");
   const auto points = static_cast<size_t>(std::clamp(in.options.number(kPoints), 0.0, 8.0));
   const double sigma = mapFilterSigma(source.variance);
-  const Rgb<float> error = errorOf(in, source, sigma);
-  const Rgb<float> difference = gaussianFiltered(squaredDifference(n.mean, d.mean), sigma);
-  const Variances now = variancesOf(in, n, sigma, points);
+  const MapFilter filter(sigma, in.options.number(kRelative) != 0 ? &d.mean : nullptr);
+  const Rgb<float> error = errorOf(in, source, filter);
+  const Rgb<float> difference = filter(squaredDifference(n.mean, d.mean));
+  const Variances now = variancesOf(in, n, filter, points);
   Variances atStop;
-  if (in.stopped) atStop = variancesOf(in, source, sigma, points);
+  if (in.stopped) atStop = variancesOf(in, source, filter, points);
   const int width = n.mean.width(), height = n.mean.height();
   MethodResult result;
   result.image.mean = Rgb<float>(width, height);

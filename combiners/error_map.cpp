@@ -60,7 +60,7 @@ Plane<float> squaredErrorSamples(const Rgb<float> (&halves)[2], const Estimate& 
 }
 
 Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
-                      const Rgb<float>& guide) {
+                      const Rgb<float>& guide, double biasOfHalves) {
   const int width = guide.width(), height = guide.height();
   const Plane<float> samples = squaredErrorSamples(halves, unbiased, variance);
   const Plane<float> spread = varianceSamples(halves);
@@ -81,7 +81,8 @@ Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, c
   bias = boxMean(bias, 7);
   Plane<float> out(width, height, kUnfilled);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) out[i] = finiteFloat(unit[i] * (noise[i] + std::max(0.0, bias[i])));
+    for (size_t i = begin; i < end; ++i)
+      out[i] = finiteFloat(unit[i] * (noise[i] + biasOfHalves * std::max(0.0, bias[i])));
   });
   return out;
 }

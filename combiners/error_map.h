@@ -28,7 +28,10 @@ Plane<float> squaredErrorSamples(const Rgb<float> (&halves)[2], const Estimate& 
 // steps 2 and 7, averages them as they are): a lamp would lend the dark pixels around it an error that is beyond
 // anything that they can have. Its sum over the image is meant, not its pixels: where it is smallest it is too small,
 // by selection. The halves must be independent of each other.
+//
+// The squared bias is that of the halves, which have seen half of the samples; `biasOfHalves` is what of it the image
+// has: 1 where bias does not fall with the samples.
 Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
-                      const Rgb<float>& guide);
+                      const Rgb<float>& guide, double biasOfHalves = 1);
 
 }  // namespace braid

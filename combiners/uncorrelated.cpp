@@ -7,6 +7,8 @@
 // weights from the two halves of the correlated image. Where the correlated image was reconstructed from the samples of
 // the independent one (gradients), each half of the one is combined with the other half of the other instead, and the
 // results are averaged.
+#include <algorithm>
+
 #include "combiners/registry.h"
 #include "combiners/uncorrelated_groups.h"
 
@@ -15,6 +17,9 @@ namespace braid {
 namespace {
 
 const OptionInfo kGamma{"uncorrelated-gamma", -1, "Sensitivity of the weights to noise; negative: chosen by variance"};
+
+const OptionInfo kMostNoise{"uncorrelated-most-noise", 30,
+                            "Most variance of a neighbour, in units of the pixel's own; 0: any (paper)"};
 
 class Uncorrelated : public Method {
  public:
@@ -30,8 +35,8 @@ class Uncorrelated : public Method {
     needs.variance = false;
     return needs;
   }
-  MethodMemory memory(const MemoryCase& /*of*/) const override { return {50, 40}; }
-  std::vector<OptionInfo> options() const override { return {kGamma}; }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {60, 40}; }
+  std::vector<OptionInfo> options() const override { return {kGamma, kMostNoise}; }
   MethodResult run(const MethodInputs& in) const override;
 };
 
@@ -39,8 +44,11 @@ MethodResult Uncorrelated::run(const MethodInputs& in) const {
   const Estimate &y = *in.unbiased, &z = *in.correlated;
   // Halves of images that share samples are crossed: half A of y meets half B of z, whose quarters make the weights.
   const size_t swap = z.correlation == Correlation::Gradients ? 1 : 0;
-  const UncorrelatedInputs groups[2] = {uncorrelatedGroup(y, z, 0, swap, swap),
-                                        uncorrelatedGroup(y, z, 1, 1 - swap, 1 - swap)};
+  NoiseChoice noise;
+  noise.most = std::clamp(in.options.number(kMostNoise), 0.0, 1e30);
+  if (noise.most > 0 && !y.variance.empty()) noise.variance = &y.variance;
+  const UncorrelatedInputs groups[2] = {uncorrelatedGroup(y, z, 0, swap, swap, noise),
+                                        uncorrelatedGroup(y, z, 1, 1 - swap, 1 - swap, noise)};
   const double gamma = chosenGamma(in, kGamma, groups);
   MethodResult result;
   Estimate& out = result.image;
@@ -51,7 +59,8 @@ MethodResult Uncorrelated::run(const MethodInputs& in) const {
     out.half[0] = out.half[1] = {};
   } else {
     const double samples = static_cast<double>(passesOf(z)) / 2;
-    out.mean = uncorrelatedFiltered({&y.mean, &z.mean, &z.half[0], &z.half[1], samples}, gamma);
+    out.mean =
+        uncorrelatedFiltered({&y.mean, &z.mean, &z.half[0], &z.half[1], samples, noise.variance, noise.most}, gamma);
     result.error = halvesVariance(out.half);
   }
   result.remarks.push_back(gammaRemark(gamma));

@@ -28,13 +28,30 @@ Plane<float> paddedDifference(const Plane<float>& a, const Plane<float>& b) {
   return mirrorPadded(out, kRadius);
 }
 
-// h and g of one channel.
+// The variance that tells how uncertain pixels are: their own, or that of most pixels around them if it is larger, as a
+// pixel may be without any by chance.
+Plane<float> paddedNoise(const Plane<float>& variance) {
+  Plane<float> out(variance.width, variance.height);
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) out[i] = std::sqrt(std::sqrt(std::max(0.0f, variance[i])));
+  });
+  const Plane<double> roots = mirrorBoxMean(out, 3);
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i)
+      out[i] = finiteFloat(std::max(static_cast<double>(variance[i]), sqr(sqr(roots[i]))));
+  });
+  return mirrorPadded(out, kRadius);
+}
+
+// h and g of one channel, and the noise of its pixels: none if neighbours are not chosen by it.
 struct Padded {
-  Plane<float> h, g;
+  Plane<float> h, g, noise;
 };
 Padded padded(const UncorrelatedInputs& in, size_t c) {
+  const Plane<float> nothing(in.first->width(), in.first->height());
   return {paddedDifference((*in.first)[c], (*in.second)[c]),
-          paddedDifference((*in.correlated)[c], (*in.independent)[c])};
+          paddedDifference((*in.correlated)[c], (*in.independent)[c]),
+          in.variance ? paddedNoise((*in.variance)[c]) : mirrorPadded(nothing, kRadius)};
 }
 
 // Rows of a padded plane: at pixel (x, y) of the image, and at its neighbour.
@@ -42,22 +59,46 @@ const float* rowOf(const Plane<float>& padded, int x, int y) {
   return padded.data.data() + padded.index(x + kRadius, y + kRadius);
 }
 
-// Adds the terms of one neighbour for `count` pixels of a row to the sums of one gamma; `exponent` is -gamma n log2(e).
-void addOne(const float* __restrict hc, const float* __restrict hi, const float* __restrict gc,
-            const float* __restrict gi, float exponent, int count, float* __restrict sum) {
+// A row of pixels of a padded plane set: at (x, y) of the image, or at their neighbours.
+struct Pixels {
+  const float *h, *g, *noise;
+};
+Pixels pixelsAt(const Padded& in, int x, int y) {
+  return {rowOf(in.h, x, y), rowOf(in.g, x, y), rowOf(in.noise, x, y)};
+}
+
+// How the differences of h make weights: k = exp2(gamma `exponent` (h_c - h_i)²).
+struct Weighting {
+  float exponent = 0;  // -n log2(e)
+  float mostNoise = 0;
+};
+constexpr float kNever = -1e9f;
+Weighting weightingOf(const UncorrelatedInputs& in, double gamma) {
+  return {-static_cast<float>(gamma * in.samples) * kLog2E, static_cast<float>(in.mostNoise)};
+}
+
+// Adds the terms of one neighbour for `count` pixels of a row to the sums of one gamma, which `by` holds already.
+void addOne(const Pixels& centre, const Pixels& neighbour, Weighting by, int count, float* __restrict sum) {
+  const float* __restrict hc = centre.h, * __restrict hi = neighbour.h;
+  const float* __restrict gc = centre.g, * __restrict gi = neighbour.g;
+  const float* __restrict nc = centre.noise, * __restrict ni = neighbour.noise;
   for (int x = 0; x < count; ++x) {
-    const float d = hc[x] - hi[x];
-    sum[x] += exp2NonPositive(std::max(exponent * (d * d), kLowestExponent)) * (gc[x] - gi[x]);
+    const float d = hc[x] - hi[x], square = by.exponent * (d * d), e = ni[x] > by.mostNoise * nc[x] ? kNever : square;
+    sum[x] += exp2NonPositive(std::max(e, kLowestExponent)) * (gc[x] - gi[x]);
   }
 }
 
-// The same for all candidates; `exponent` is -n log2(e). Three exponentials are enough, the other weights are products
-// of them. Weights below 10⁻¹⁸ are raised to it before they are multiplied, so that no product is subnormal.
-void addAll(const float* __restrict hc, const float* __restrict hi, const float* __restrict gc,
-            const float* __restrict gi, float exponent, int count, float (&__restrict sums)[kCandidates][kBlock]) {
+// The same for all candidates. Three exponentials are enough, the other weights are products of them. Weights below
+// 10⁻¹⁸ are raised to it before they are multiplied, so that no product is subnormal.
+void addAll(const Pixels& centre, const Pixels& neighbour, Weighting by, int count,
+            float (&__restrict sums)[kCandidates][kBlock]) {
   constexpr float kTiny = 1e-18f;
+  const float* __restrict hc = centre.h, * __restrict hi = neighbour.h;
+  const float* __restrict gc = centre.g, * __restrict gi = neighbour.g;
+  const float* __restrict nc = centre.noise, * __restrict ni = neighbour.noise;
   for (int x = 0; x < count; ++x) {
-    const float d = hc[x] - hi[x], g = gc[x] - gi[x], e = exponent * (d * d);
+    const float d = hc[x] - hi[x], g = gc[x] - gi[x], square = by.exponent * (d * d);
+    const float e = ni[x] > by.mostNoise * nc[x] ? kNever : square;
     const float k001 = exp2NonPositive(std::max(0.01f * e, kLowestExponent));
     const float k0025 = std::max(exp2NonPositive(0.025f * e), kTiny), k005 = std::max(k0025 * k0025, kTiny);
     const float k01 = std::max(k005 * k005, kTiny), k02 = k01 * k01;
@@ -76,23 +117,22 @@ void addAll(const float* __restrict hc, const float* __restrict hi, const float*
   }
 }
 
-// Calls add(hc, hi, gc, gi) for every neighbour of the pixels from (x0, y) on.
+// Calls add(pixels, neighbours) for every neighbour of the pixels from (x0, y) on.
 template <class Add>
 void forNeighbours(const Padded& in, int x0, int y, const Add& add) {
-  const float *hc = rowOf(in.h, x0, y), *gc = rowOf(in.g, x0, y);
+  const Pixels centre = pixelsAt(in, x0, y);
   for (int dy = -kRadius; dy <= kRadius; ++dy)
     for (int dx = -kRadius; dx <= kRadius; ++dx)
-      if (dx != 0 || dy != 0) add(hc, rowOf(in.h, x0 + dx, y + dy), gc, rowOf(in.g, x0 + dx, y + dy));
+      if (dx != 0 || dy != 0) add(centre, pixelsAt(in, x0 + dx, y + dy));
 }
 
 // Σ k (g_c - g_i) / 224 of every candidate for `count` pixels of row y.
-void candidateSums(const Padded& in, double samples, int x0, int y, int count, float (&sums)[kCandidates][kBlock]) {
+void candidateSums(const Padded& in, const Weighting& by, int x0, int y, int count,
+                   float (&sums)[kCandidates][kBlock]) {
   for (auto& row : sums) std::fill_n(row, kBlock, 0.0f);
-  const float exponent = -static_cast<float>(samples) * kLog2E;
   runVectorised([&] {
-    forNeighbours(in, x0, y, [&](const float* hc, const float* hi, const float* gc, const float* gi) {
-      addAll(hc, hi, gc, gi, exponent, count, sums);
-    });
+    forNeighbours(in, x0, y,
+                  [&](const Pixels& centre, const Pixels& neighbour) { addAll(centre, neighbour, by, count, sums); });
   });
   for (auto& row : sums)
     for (float& s : row) s /= kNeighbours;
@@ -105,7 +145,7 @@ void addRowScores(const Padded (&in)[2], const UncorrelatedInputs (&groups)[2], 
   const int width = level.width;
   for (int x0 = 0; x0 < width; x0 += kBlock) {
     const int count = std::min(kBlock, width - x0);
-    for (size_t j = 0; j < 2; ++j) candidateSums(in[j], groups[j].samples, x0, y, count, sums[j]);
+    for (size_t j = 0; j < 2; ++j) candidateSums(in[j], weightingOf(groups[j], 1), x0, y, count, sums[j]);
     for (int x = 0; x < count; ++x) {
       const size_t i = level.index(x0 + x, y);
       const double base =
@@ -123,7 +163,7 @@ void addRowScores(const Padded (&in)[2], const UncorrelatedInputs (&groups)[2], 
 Rgb<float> uncorrelatedFiltered(const UncorrelatedInputs& in, double gamma) {
   const Rgb<float>& y = *in.independent;
   const int width = y.width();
-  const float exponent = -static_cast<float>(gamma * in.samples) * kLog2E;
+  const Weighting by = weightingOf(in, gamma);
   Rgb<float> out(width, y.height());
   for (size_t c = 0; c < 3; ++c) {
     const Padded planes = padded(in, c);
@@ -133,8 +173,8 @@ Rgb<float> uncorrelatedFiltered(const UncorrelatedInputs& in, double gamma) {
         const int count = std::min(kBlock, width - x0);
         std::fill_n(sum, kBlock, 0.0f);
         runVectorised([&] {
-          forNeighbours(planes, x0, row, [&](const float* hc, const float* hi, const float* gc, const float* gi) {
-            addOne(hc, hi, gc, gi, exponent, count, sum);
+          forNeighbours(planes, x0, row, [&](const Pixels& centre, const Pixels& neighbour) {
+            addOne(centre, neighbour, by, count, sum);
           });
         });
         for (int x = 0; x < count; ++x) out[c].at(x0 + x, row) = y[c].at(x0 + x, row) + sum[x] / kNeighbours;

@@ -8,6 +8,12 @@
 //
 // With h = z1 - z2 and g = z - y the formula is out_c = y_c + Σ k(h_c - h_i) (g_c - g_i): one plane decides the weights
 // and one is averaged.
+//
+// A neighbour whose samples are much more uncertain than those of the pixel (a lamp's mirror image beside the dark) is
+// left out, k_i = 0: a 224th of its error may be many times the pixel's own. Where rare strong samples make the
+// variance, leaving pixels out by it costs some bias: at 30 times the variance none that 40 renders of five scenes can
+// tell, at 8 times it is 5 % of the squared error. The error falls below that of both inputs in 64 cases of 70 instead
+// of 60 (14 scenes at 8 to 128 samples).
 #pragma once
 
 #include <array>
@@ -27,6 +33,9 @@ struct UncorrelatedInputs {
   const Rgb<float>*independent = nullptr, *correlated = nullptr;  // y and z
   const Rgb<float>*first = nullptr, *second = nullptr;            // of z
   double samples = 1;
+  // Of the mean of y, or null; and the most of it that a neighbour may have, in units of the pixel's own.
+  const Rgb<float>* variance = nullptr;
+  double mostNoise = 0;
 };
 
 // The combination for one gamma >= 0. With gamma 0 all k_i are 1/224 and the centre keeps nothing.

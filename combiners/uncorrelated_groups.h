@@ -10,13 +10,24 @@
 
 namespace braid {
 
+// The variance of the independent image by which neighbours are left out, or null; see UncorrelatedInputs.
+struct NoiseChoice {
+  const Rgb<float>* variance = nullptr;
+  double most = 0;
+};
+
 // Half `values` of both images, combined with weights from the two quarters of half `weights` of the correlated image:
 // quarters 0 and 2 make half 0. The halves of the images are used as the means of the pairs of quarters, for they are
 // right even if the quarters differ in passes.
 inline UncorrelatedInputs uncorrelatedGroup(const Estimate& y, const Estimate& z, size_t independentHalf,
-                                            size_t correlatedHalf, size_t weights) {
-  return {&y.half[independentHalf], &z.half[correlatedHalf], &z.quarter[weights], &z.quarter[weights + 2],
-          static_cast<double>(passesOf(z)) / 4};
+                                            size_t correlatedHalf, size_t weights, const NoiseChoice& noise = {}) {
+  return {&y.half[independentHalf],
+          &z.half[correlatedHalf],
+          &z.quarter[weights],
+          &z.quarter[weights + 2],
+          static_cast<double>(passesOf(z)) / 4,
+          noise.variance,
+          noise.most};
 }
 
 // The option when it is set, or else the best gamma for these groups. Large images vote with every fourth row.

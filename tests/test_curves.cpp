@@ -205,6 +205,30 @@ TEST_CASE("The denoised image fades as samples are added") {
   CHECK(share[1] < 0.5 * share[0]);
 }
 
+// A lamp whose noise is far above everything else, in the dark, where the denoised image is wrong by ten deviations.
+TEST_CASE("A lamp does not hide what is wrong with the denoised image in the dark around it") {
+  constexpr int kSize = 21, kCentre = kSize / 2;
+  Estimate noisy, wrong;
+  noisy.name = "pt";
+  noisy.passes = 64;
+  noisy.mean = Rgb<float>(kSize, kSize, 0.1f);
+  noisy.variance = Rgb<float>(kSize, kSize, 1e-4f);
+  wrong.mean = Rgb<float>(kSize, kSize, 0.2f);
+  for (size_t c = 0; c < 3; ++c) {
+    noisy.mean[c].at(kCentre, kCentre) = wrong.mean[c].at(kCentre, kCentre) = 100;
+    noisy.variance[c].at(kCentre, kCentre) = 100;
+  }
+  MethodInputs in;
+  in.unbiased = &noisy;
+  in.biased = &wrong;
+  in.redenoise = [&](const Rgb<float>&) { return wrong.mean; };
+  const auto shareBeside = [&](double relative) {
+    return run(in, {{"relative", relative}, {"gate", 0}}).aovs[0].plane.at(kCentre - 2, kCentre + 1);
+  };
+  CHECK(shareBeside(0) > 0.9f);
+  CHECK(shareBeside(1) < 0.1f);
+}
+
 TEST_CASE("Halves take the weights of the image, few passes take the fallback, and options act") {
   const Case c = makeCase();
   const MethodInputs in = inputsOf(c, "wide");
@@ -218,7 +242,11 @@ TEST_CASE("Halves take the weights of the image, few passes take the fallback, a
   CHECK(identical(run(bare).image.mean, run(in, {{"points", 1}}).image.mean));
   // With slope -1 it is the mean by inverse squared errors, at least as much of the denoised image where that is
   // better.
-  CHECK(meanOf(run(bare, {{"fallback-slope", -1}}).aovs[0].plane) > meanOf(run(bare).aovs[0].plane));
+  const auto shareWith = [&](double slope) {
+    return meanOf(run(bare, {{"relative", 0}, {"fallback-slope", slope}}).aovs[0].plane);
+  };
+  CHECK(shareWith(-1) > shareWith(-2));
+  CHECK_FALSE(identical(run(in, {{"relative", 0}}).image.mean, m));
   CHECK(identical(run(in, {{"most", 0}}).image.mean, c.pt().mean));
   CaseOptions few;
   few.samples = 8;

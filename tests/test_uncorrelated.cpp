@@ -193,6 +193,26 @@ TEST_CASE("The methods: less noise than their input, halves, error, and a gamma 
   CHECK(make_uncorrelated()->run(fixed).remarks[0].number == 0.7);
 }
 
+TEST_CASE("A neighbour of many times the pixel's variance is left out, and not the other way round") {
+  constexpr int kSize = 31, kLamp = 15;
+  const Rgb<float> z(kSize, kSize, 0.1f), nothing(kSize, kSize, 0.0f);
+  Rgb<float> y = z, variance(kSize, kSize, 1e-4f);
+  for (size_t c = 0; c < 3; ++c) {
+    y[c].at(kLamp, kLamp) += 50;
+    variance[c].at(kLamp, kLamp) = 2500;
+  }
+  const auto filtered = [&](const Rgb<float>* noise, double most) {
+    return uncorrelatedFiltered({&y, &z, &nothing, &nothing, 16, noise, most}, 0.5);
+  };
+  const Rgb<float> paper = filtered(nullptr, 0), out = filtered(&variance, 30), most = filtered(&variance, 1e30);
+  for (size_t c = 0; c < 3; ++c) {
+    CHECK(std::fabs(paper[c].at(kLamp + 3, kLamp) - 0.1f) > 0.2f);
+    CHECK(std::fabs(out[c].at(kLamp + 3, kLamp) - 0.1f) < 1e-5f);
+    CHECK(out[c].at(kLamp, kLamp) == doctest::Approx(0.1));  // the noise of the lamp itself goes
+    CHECK(identical(most, paper));
+  }
+}
+
 TEST_CASE("Images from gradients are crossed: their halves meet the other halves of the samples") {
   Case c = makeCase();
   c.estimates.estimates[1].correlation = Correlation::Gradients;
@@ -200,8 +220,10 @@ TEST_CASE("Images from gradients are crossed: their halves meet the other halves
   in.options.set("uncorrelated-gamma", 0.2);
   const MethodResult r = make_uncorrelated()->run(in);
   const Estimate &y = c.pt(), &z = c.crn();
-  const Rgb<float> a = uncorrelatedFiltered({&y.half[0], &z.half[1], &z.quarter[1], &z.quarter[3], 8}, 0.2);
-  const Rgb<float> b = uncorrelatedFiltered({&y.half[1], &z.half[0], &z.quarter[0], &z.quarter[2], 8}, 0.2);
+  const Rgb<float> a =
+      uncorrelatedFiltered({&y.half[0], &z.half[1], &z.quarter[1], &z.quarter[3], 8, &y.variance, 30}, 0.2);
+  const Rgb<float> b =
+      uncorrelatedFiltered({&y.half[1], &z.half[0], &z.quarter[0], &z.quarter[2], 8, &y.variance, 30}, 0.2);
   for (size_t i = 0; i < a.size(); ++i) CHECK(r.image.mean[1][i] == 0.5f * (a[1][i] + b[1][i]));
   CHECK(r.image.half[0].empty());
   CHECK(r.error.empty());

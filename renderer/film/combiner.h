@@ -51,7 +51,7 @@ struct Needs {
   int checkpoints = 0;
   uint64_t passes = 2;     // of the unbiased estimate
   bool halves = true;      // of the unbiased and the biased image and the bases; false: works on the means alone
-  bool variance = true;    // of the unbiased estimate
+  bool variance = true;    // of the unbiased estimate; false: works without
   bool redenoise = false;  // the biased image must come from a denoiser, which is run again
 };
 
