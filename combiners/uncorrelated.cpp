@@ -19,7 +19,7 @@ namespace {
 const OptionInfo kGamma{"uncorrelated-gamma", -1, "Sensitivity of the weights to noise; negative: chosen by variance"};
 
 const OptionInfo kMostNoise{"uncorrelated-most-noise", 30,
-                            "Most variance of a neighbour, in units of the pixel's own; 0: any (paper)"};
+                            "Most variance of one pixel of a pair, in units of the other's; 0: any (paper)"};
 
 class Uncorrelated : public Method {
  public:
@@ -46,7 +46,11 @@ MethodResult Uncorrelated::run(const MethodInputs& in) const {
   const size_t swap = z.correlation == Correlation::Gradients ? 1 : 0;
   NoiseChoice noise;
   noise.most = std::clamp(in.options.number(kMostNoise), 0.0, 1e30);
-  if (noise.most > 0 && !y.variance.empty()) noise.variance = &y.variance;
+  Rgb<float> levels;
+  if (noise.most > 0 && !y.variance.empty()) {
+    levels = noiseLevels(y.mean, y.variance);
+    noise.levels = &levels;
+  }
   const UncorrelatedInputs groups[2] = {uncorrelatedGroup(y, z, 0, swap, swap, noise),
                                         uncorrelatedGroup(y, z, 1, 1 - swap, 1 - swap, noise)};
   const double gamma = chosenGamma(in, kGamma, groups);
@@ -60,7 +64,7 @@ MethodResult Uncorrelated::run(const MethodInputs& in) const {
   } else {
     const double samples = static_cast<double>(passesOf(z)) / 2;
     out.mean =
-        uncorrelatedFiltered({&y.mean, &z.mean, &z.half[0], &z.half[1], samples, noise.variance, noise.most}, gamma);
+        uncorrelatedFiltered({&y.mean, &z.mean, &z.half[0], &z.half[1], samples, noise.levels, noise.most}, gamma);
     result.error = halvesVariance(out.half);
   }
   result.remarks.push_back(gammaRemark(gamma));

@@ -17,6 +17,9 @@ constexpr float kNeighbours = (2 * kRadius + 1) * (2 * kRadius + 1) - 1;
 constexpr int kBlock = 128;  // columns at a time: the sums of all candidates stay in the first cache
 // Weights below 2^-80 are nothing, and their products would be subnormal numbers, which take hundreds of cycles.
 constexpr float kLowestExponent = -80;
+// The square of a mean in units of its variance from which on it is that of several strong samples, not of one to
+// three.
+constexpr double kEstablished = 4;
 constexpr size_t kCandidates = kUncorrelatedGammas.size();
 
 // a - b with mirrored pixels around it.
@@ -24,21 +27,6 @@ Plane<float> paddedDifference(const Plane<float>& a, const Plane<float>& b) {
   Plane<float> out(a.width, a.height);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) out[i] = a[i] - b[i];
-  });
-  return mirrorPadded(out, kRadius);
-}
-
-// The variance that tells how uncertain pixels are: their own, or that of most pixels around them if it is larger, as a
-// pixel may be without any by chance.
-Plane<float> paddedNoise(const Plane<float>& variance) {
-  Plane<float> out(variance.width, variance.height);
-  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) out[i] = std::sqrt(std::sqrt(std::max(0.0f, variance[i])));
-  });
-  const Plane<double> roots = mirrorBoxMean(out, 3);
-  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i)
-      out[i] = finiteFloat(std::max(static_cast<double>(variance[i]), sqr(sqr(roots[i]))));
   });
   return mirrorPadded(out, kRadius);
 }
@@ -51,7 +39,7 @@ Padded padded(const UncorrelatedInputs& in, size_t c) {
   const Plane<float> nothing(in.first->width(), in.first->height());
   return {paddedDifference((*in.first)[c], (*in.second)[c]),
           paddedDifference((*in.correlated)[c], (*in.independent)[c]),
-          in.variance ? paddedNoise((*in.variance)[c]) : mirrorPadded(nothing, kRadius)};
+          mirrorPadded(in.noise ? (*in.noise)[c] : nothing, kRadius)};
 }
 
 // Rows of a padded plane: at pixel (x, y) of the image, and at its neighbour.
@@ -73,6 +61,11 @@ struct Weighting {
   float mostNoise = 0;
 };
 constexpr float kNever = -1e9f;
+// The exponent of a pair. Both pixels see the same, so that what one loses to the other comes back.
+inline float exponentOf(float d, float noise, float other, const Weighting& by) {
+  const float exponent = by.exponent * (d * d);
+  return std::max(noise, other) > by.mostNoise * std::min(noise, other) ? kNever : exponent;
+}
 Weighting weightingOf(const UncorrelatedInputs& in, double gamma) {
   return {-static_cast<float>(gamma * in.samples) * kLog2E, static_cast<float>(in.mostNoise)};
 }
@@ -83,7 +76,7 @@ void addOne(const Pixels& centre, const Pixels& neighbour, Weighting by, int cou
   const float* __restrict gc = centre.g, * __restrict gi = neighbour.g;
   const float* __restrict nc = centre.noise, * __restrict ni = neighbour.noise;
   for (int x = 0; x < count; ++x) {
-    const float d = hc[x] - hi[x], square = by.exponent * (d * d), e = ni[x] > by.mostNoise * nc[x] ? kNever : square;
+    const float e = exponentOf(hc[x] - hi[x], nc[x], ni[x], by);
     sum[x] += exp2NonPositive(std::max(e, kLowestExponent)) * (gc[x] - gi[x]);
   }
 }
@@ -97,8 +90,7 @@ void addAll(const Pixels& centre, const Pixels& neighbour, Weighting by, int cou
   const float* __restrict gc = centre.g, * __restrict gi = neighbour.g;
   const float* __restrict nc = centre.noise, * __restrict ni = neighbour.noise;
   for (int x = 0; x < count; ++x) {
-    const float d = hc[x] - hi[x], g = gc[x] - gi[x], square = by.exponent * (d * d);
-    const float e = ni[x] > by.mostNoise * nc[x] ? kNever : square;
+    const float g = gc[x] - gi[x], e = exponentOf(hc[x] - hi[x], nc[x], ni[x], by);
     const float k001 = exp2NonPositive(std::max(0.01f * e, kLowestExponent));
     const float k0025 = std::max(exp2NonPositive(0.025f * e), kTiny), k005 = std::max(k0025 * k0025, kTiny);
     const float k01 = std::max(k005 * k005, kTiny), k02 = k01 * k01;
@@ -159,6 +151,25 @@ void addRowScores(const Padded (&in)[2], const UncorrelatedInputs (&groups)[2], 
 }
 
 }  // namespace
+
+Rgb<float> noiseLevels(const Rgb<float>& mean, const Rgb<float>& variance) {
+  Rgb<float> out(mean.width(), mean.height(), kUnfilled);
+  Plane<float> roots(mean.width(), mean.height(), kUnfilled);
+  for (size_t c = 0; c < 3; ++c) {
+    parallelChunks(roots.size(), kPixelChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) roots[i] = std::sqrt(std::sqrt(std::max(0.0f, variance[c][i])));
+    });
+    const Plane<double> around = mirrorBoxMean(roots, 3);
+    parallelChunks(roots.size(), kPixelChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        const double own = static_cast<double>(variance[c][i]), most = sqr(sqr(around[i]));
+        const bool established = kEstablished * own <= sqr(static_cast<double>(mean[c][i]));
+        out[c][i] = finiteFloat(established ? std::max(own, most) : most);
+      }
+    });
+  }
+  return out;
+}
 
 Rgb<float> uncorrelatedFiltered(const UncorrelatedInputs& in, double gamma) {
   const Rgb<float>& y = *in.independent;

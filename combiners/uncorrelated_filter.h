@@ -9,11 +9,9 @@
 // With h = z1 - z2 and g = z - y the formula is out_c = y_c + Σ k(h_c - h_i) (g_c - g_i): one plane decides the weights
 // and one is averaged.
 //
-// A neighbour whose samples are much more uncertain than those of the pixel (a lamp's mirror image beside the dark) is
-// left out, k_i = 0: a 224th of its error may be many times the pixel's own. Where rare strong samples make the
-// variance, leaving pixels out by it costs some bias: at 30 times the variance none that 40 renders of five scenes can
-// tell, at 8 times it is 5 % of the squared error. The error falls below that of both inputs in 64 cases of 70 instead
-// of 60 (14 scenes at 8 to 128 samples).
+// Pairs of pixels of which one is much more uncertain than the other (a lamp's mirror image beside the dark) are left
+// out, k_i = 0: a 224th of the one's error may be many times the other's own. Left out for both, they change no mean of
+// the image. Without that, where rare strong samples make the variance, up to 8 % of the light goes (glass of water).
 #pragma once
 
 #include <array>
@@ -33,10 +31,15 @@ struct UncorrelatedInputs {
   const Rgb<float>*independent = nullptr, *correlated = nullptr;  // y and z
   const Rgb<float>*first = nullptr, *second = nullptr;            // of z
   double samples = 1;
-  // Of the mean of y, or null; and the most of it that a neighbour may have, in units of the pixel's own.
-  const Rgb<float>* variance = nullptr;
+  // noiseLevels() of y, or null; and the most that one pixel of a pair may have, in units of the other's.
+  const Rgb<float>* noise = nullptr;
   double mostNoise = 0;
 };
+
+// How uncertain pixels are, from their mean and its variance: their variance or that of most pixels around them (the
+// fourth power of the 7x7 mean of the fourth roots), whichever is larger, for a pixel may be without any by chance; and
+// the latter alone where the mean is below twice its deviation, as that of one rare strong sample is.
+Rgb<float> noiseLevels(const Rgb<float>& mean, const Rgb<float>& variance);
 
 // The combination for one gamma >= 0. With gamma 0 all k_i are 1/224 and the centre keeps nothing.
 Rgb<float> uncorrelatedFiltered(const UncorrelatedInputs& in, double gamma);

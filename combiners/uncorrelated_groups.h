@@ -10,9 +10,9 @@
 
 namespace braid {
 
-// The variance of the independent image by which neighbours are left out, or null; see UncorrelatedInputs.
+// By what neighbours are left out; see UncorrelatedInputs.
 struct NoiseChoice {
-  const Rgb<float>* variance = nullptr;
+  const Rgb<float>* levels = nullptr;
   double most = 0;
 };
 
@@ -26,7 +26,7 @@ inline UncorrelatedInputs uncorrelatedGroup(const Estimate& y, const Estimate& z
           &z.quarter[weights],
           &z.quarter[weights + 2],
           static_cast<double>(passesOf(z)) / 4,
-          noise.variance,
+          noise.levels,
           noise.most};
 }
 

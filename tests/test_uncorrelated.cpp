@@ -193,23 +193,33 @@ TEST_CASE("The methods: less noise than their input, halves, error, and a gamma 
   CHECK(make_uncorrelated()->run(fixed).remarks[0].number == 0.7);
 }
 
-TEST_CASE("A neighbour of many times the pixel's variance is left out, and not the other way round") {
+TEST_CASE("Pairs with a lamp are left out, those with a rare strong sample are not, and no light is lost") {
   constexpr int kSize = 31, kLamp = 15;
   const Rgb<float> z(kSize, kSize, 0.1f), nothing(kSize, kSize, 0.0f);
-  Rgb<float> y = z, variance(kSize, kSize, 1e-4f);
-  for (size_t c = 0; c < 3; ++c) {
-    y[c].at(kLamp, kLamp) += 50;
-    variance[c].at(kLamp, kLamp) = 2500;
-  }
-  const auto filtered = [&](const Rgb<float>* noise, double most) {
-    return uncorrelatedFiltered({&y, &z, &nothing, &nothing, 16, noise, most}, 0.5);
+  Rgb<float> y = z;
+  for (size_t c = 0; c < 3; ++c) y[c].at(kLamp, kLamp) += 5;
+  const auto filtered = [&](float varianceOfLamp, double most) {
+    Rgb<float> variance(kSize, kSize, 1e-4f);
+    for (size_t c = 0; c < 3; ++c) variance[c].at(kLamp, kLamp) = varianceOfLamp;
+    const Rgb<float> levels = noiseLevels(y, variance);
+    return uncorrelatedFiltered({&y, &z, &nothing, &nothing, 16, &levels, most}, 0.5);
   };
-  const Rgb<float> paper = filtered(nullptr, 0), out = filtered(&variance, 30), most = filtered(&variance, 1e30);
+  const Rgb<float> paper = uncorrelatedFiltered({&y, &z, &nothing, &nothing, 16}, 0.5);
+  const Rgb<float> lamp = filtered(1, 30), rare = filtered(25, 30), anyNoise = filtered(1, 1e30);
+  CHECK(identical(rare, paper));
+  CHECK(identical(anyNoise, paper));
   for (size_t c = 0; c < 3; ++c) {
-    CHECK(std::fabs(paper[c].at(kLamp + 3, kLamp) - 0.1f) > 0.2f);
-    CHECK(std::fabs(out[c].at(kLamp + 3, kLamp) - 0.1f) < 1e-5f);
-    CHECK(out[c].at(kLamp, kLamp) == doctest::Approx(0.1));  // the noise of the lamp itself goes
-    CHECK(identical(most, paper));
+    CHECK(paper[c].at(kLamp + 3, kLamp) - 0.1f > 0.02f);
+    CHECK(lamp[c].at(kLamp + 3, kLamp) == doctest::Approx(0.1));
+    CHECK(lamp[c].at(kLamp, kLamp) == doctest::Approx(5.1));
+    for (const Rgb<float>* out : {&paper, &lamp}) {
+      double before = 0, after = 0;
+      for (size_t i = 0; i < y.size(); ++i) {
+        before += static_cast<double>(y[c][i]);
+        after += static_cast<double>((*out)[c][i]);
+      }
+      CHECK(after == doctest::Approx(before).epsilon(1e-5));
+    }
   }
 }
 
@@ -220,10 +230,11 @@ TEST_CASE("Images from gradients are crossed: their halves meet the other halves
   in.options.set("uncorrelated-gamma", 0.2);
   const MethodResult r = make_uncorrelated()->run(in);
   const Estimate &y = c.pt(), &z = c.crn();
+  const Rgb<float> levels = noiseLevels(y.mean, y.variance);
   const Rgb<float> a =
-      uncorrelatedFiltered({&y.half[0], &z.half[1], &z.quarter[1], &z.quarter[3], 8, &y.variance, 30}, 0.2);
+      uncorrelatedFiltered({&y.half[0], &z.half[1], &z.quarter[1], &z.quarter[3], 8, &levels, 30}, 0.2);
   const Rgb<float> b =
-      uncorrelatedFiltered({&y.half[1], &z.half[0], &z.quarter[0], &z.quarter[2], 8, &y.variance, 30}, 0.2);
+      uncorrelatedFiltered({&y.half[1], &z.half[0], &z.quarter[0], &z.quarter[2], 8, &levels, 30}, 0.2);
   for (size_t i = 0; i < a.size(); ++i) CHECK(r.image.mean[1][i] == 0.5f * (a[1][i] + b[1][i]));
   CHECK(r.image.half[0].empty());
   CHECK(r.error.empty());
