@@ -18,7 +18,7 @@ namespace {
 
 const OptionInfo kGamma{"uncorrelated-gamma", -1, "Sensitivity of the weights to noise; negative: chosen by variance"};
 
-const OptionInfo kMostNoise{"uncorrelated-most-noise", 30,
+const OptionInfo kMostNoise{"uncorrelated-most-noise", 224,
                             "Most variance of one pixel of a pair, in units of the other's; 0: any (paper)"};
 
 class Uncorrelated : public Method {

@@ -232,9 +232,9 @@ TEST_CASE("Images from gradients are crossed: their halves meet the other halves
   const Estimate &y = c.pt(), &z = c.crn();
   const Rgb<float> levels = noiseLevels(y.mean, y.variance);
   const Rgb<float> a =
-      uncorrelatedFiltered({&y.half[0], &z.half[1], &z.quarter[1], &z.quarter[3], 8, &levels, 30}, 0.2);
+      uncorrelatedFiltered({&y.half[0], &z.half[1], &z.quarter[1], &z.quarter[3], 8, &levels, 224}, 0.2);
   const Rgb<float> b =
-      uncorrelatedFiltered({&y.half[1], &z.half[0], &z.quarter[0], &z.quarter[2], 8, &levels, 30}, 0.2);
+      uncorrelatedFiltered({&y.half[1], &z.half[0], &z.quarter[0], &z.quarter[2], 8, &levels, 224}, 0.2);
   for (size_t i = 0; i < a.size(); ++i) CHECK(r.image.mean[1][i] == 0.5f * (a[1][i] + b[1][i]));
   CHECK(r.image.half[0].empty());
   CHECK(r.error.empty());
