@@ -12,7 +12,7 @@
 // Pairs of pixels of which one is much more uncertain than the other (a lamp's mirror image beside the dark) are left
 // out, k_i = 0: a 224th of the one's error may be many times the other's own. Left out for both, they change no mean of
 // the image: left out for one, up to 8 % of the light went where rare strong samples make the variance (glass of water
-// at 16 samples). At 224 times the variance, plates have at most 4.3 times the error of the better input instead of
+// at 16 samples). At 224 times the variance, plates have at most 4.4 times the error of the better input instead of
 // 16.5; at 30 times 2.5, but caustics, whose pixels are as uncertain, stay noisy.
 #pragma once
 
