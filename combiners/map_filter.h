@@ -17,15 +17,16 @@ class MapFilter {
  public:
   // `level`: null counts pixels as they are.
   MapFilter(double sigma, const Rgb<float>* level);
-  // Squares of radiances in units of the pixel, and back.
-  Rgb<float> toUnits(Rgb<float> map) const;
-  Rgb<float> fromUnits(Rgb<float> map) const;
-  // Both around the filter.
+  // Of squares of radiances.
   Rgb<float> operator()(const Rgb<float>& map) const;
   // The filtered map of risks without negative values by the sign rule (applySignRule()).
   Rgb<float> risk(Rgb<float> sure, const Rgb<float>& variance) const;
 
  private:
+  // Squares of radiances in units of the pixel, and back.
+  Rgb<float> toUnits(Rgb<float> map) const;
+  Rgb<float> fromUnits(Rgb<float> map) const;
+
   double sigma_;
   std::array<Plane<float>, 3> unit_;  // or empty
 };

@@ -72,12 +72,10 @@ Plane<double> numerators(const Plane<double>& variance, const JamesSteinSettings
 
 // One over what a squared difference is measured in.
 Plane<float> inverseUnits(const Plane<float>& variance) {
+  const Plane<double> around = usualVariance(variance);
   Plane<float> out(variance.width, variance.height, kUnfilled);
-  forAll(out.size(), [&](size_t i) { out[i] = std::sqrt(std::sqrt(variance[i])); });
-  const Plane<double> roots = mirrorBoxMean(out, 3);
   forAll(out.size(), [&](size_t i) {
-    const double around = roots[i] * roots[i] * roots[i] * roots[i];
-    out[i] = static_cast<float>(1 / std::max(0.5 * (static_cast<double>(variance[i]) + around), 1e-30));
+    out[i] = static_cast<float>(1 / std::max(0.5 * (static_cast<double>(variance[i]) + around[i]), 1e-30));
   });
   return out;
 }
@@ -167,6 +165,14 @@ double shrinkageFactor(double numerator, double sumOfSquares, bool positivePart)
   const double factor = 1 - numerator / std::max(sumOfSquares, kLeastSum);
   if (!std::isfinite(factor)) return 0;
   return positivePart ? std::max(0.0, factor) : factor;
+}
+
+Plane<double> usualVariance(const Plane<float>& variance) {
+  Plane<float> roots(variance.width, variance.height, kUnfilled);
+  forAll(roots.size(), [&](size_t i) { roots[i] = std::sqrt(std::sqrt(std::max(0.0f, variance[i]))); });
+  Plane<double> mean = mirrorBoxMean(roots, 3);
+  forAll(mean.size(), [&](size_t i) { mean[i] = mean[i] * mean[i] * mean[i] * mean[i]; });
+  return mean;
 }
 
 NoiseScale noiseScale(const Rgb<float>& variance, const JamesSteinSettings& settings) {

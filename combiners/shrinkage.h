@@ -44,6 +44,10 @@ struct JamesSteinSettings {
 // small do not matter, and 0 / 0 is 1, for X and Y agree.
 double shrinkageFactor(double numerator, double sumOfSquares, bool positivePart);
 
+// The variance of most pixels around every one: the fourth power of the 7x7 mean of the fourth roots, to which a few
+// outliers add little.
+Plane<double> usualVariance(const Plane<float>& variance);
+
 // What of the noise does not depend on Y: worth keeping when one image is shrunk towards several.
 struct NoiseScale {
   std::array<Plane<float>, 3> inverseUnit;  // one over what a squared difference is measured in; empty: 1

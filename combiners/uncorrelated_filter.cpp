@@ -7,6 +7,7 @@
 #include "combiners/denoise/window.h"
 #include "combiners/finite_float.h"
 #include "combiners/mirror.h"
+#include "combiners/shrinkage.h"
 
 namespace braid {
 
@@ -154,17 +155,13 @@ void addRowScores(const Padded (&in)[2], const UncorrelatedInputs (&groups)[2], 
 
 Rgb<float> noiseLevels(const Rgb<float>& mean, const Rgb<float>& variance) {
   Rgb<float> out(mean.width(), mean.height(), kUnfilled);
-  Plane<float> roots(mean.width(), mean.height(), kUnfilled);
   for (size_t c = 0; c < 3; ++c) {
-    parallelChunks(roots.size(), kPixelChunk, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) roots[i] = std::sqrt(std::sqrt(std::max(0.0f, variance[c][i])));
-    });
-    const Plane<double> around = mirrorBoxMean(roots, 3);
-    parallelChunks(roots.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    const Plane<double> around = usualVariance(variance[c]);
+    parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
-        const double own = static_cast<double>(variance[c][i]), most = sqr(sqr(around[i]));
+        const auto own = static_cast<double>(variance[c][i]);
         const bool established = kEstablished * own <= sqr(static_cast<double>(mean[c][i]));
-        out[c][i] = finiteFloat(established ? std::max(own, most) : most);
+        out[c][i] = finiteFloat(established ? std::max(own, around[i]) : around[i]);
       }
     });
   }

@@ -38,9 +38,9 @@ struct UncorrelatedInputs {
   double mostNoise = 0;
 };
 
-// How uncertain pixels are, from their mean and its variance: their variance or that of most pixels around them (the
-// fourth power of the 7x7 mean of the fourth roots), whichever is larger, for a pixel may be without any by chance; and
-// the latter alone where the mean is below twice its deviation, as that of one rare strong sample is.
+// How uncertain pixels are, from their mean and its variance: their variance or usualVariance() around them, whichever
+// is larger, for a pixel may be without any by chance; and the latter alone where the mean is below twice its
+// deviation, as that of one rare strong sample is.
 Rgb<float> noiseLevels(const Rgb<float>& mean, const Rgb<float>& variance);
 
 // The combination for one gamma >= 0. With gamma 0 all k_i are 1/224 and the centre keeps nothing.
