@@ -96,12 +96,12 @@ void GradientKernel::arrive(const std::vector<Walker*>& walkers, const std::vect
   while (active > 0) {
     if (record_)
       for (int a = 0; a < active; ++a) record_->push_back({rays_.get(a), false});
-    scene_.accel().intersect(rays_, active, hit_.data());
+    scene_.accel().intersect(rays_, active, query_.data());
     rayCount += static_cast<uint64_t>(active);
     int next = 0;
     for (int a = 0; a < active; ++a) {
       const size_t i = index[static_cast<size_t>(a)];
-      if (!meet(*walkers[i], hit_[static_cast<size_t>(a)], *samples[i])) continue;
+      if (!meet(*walkers[i], query_[static_cast<size_t>(a)], *samples[i])) continue;
       walkers[i]->straight = false;
       index[static_cast<size_t>(next)] = i;
       queueRay(next++, walkers[i]->path);

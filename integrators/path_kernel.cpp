@@ -2,6 +2,7 @@
 #include "integrators/path_kernel.h"
 
 #include <algorithm>
+#include <memory>
 
 #include "integrators/camera_paths.h"
 #include "renderer/core/error.h"
@@ -108,7 +109,7 @@ bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Bsdf& 
 
   const float weight = light.delta ? 1.0f : powerHeuristic(light.pdfW, value.pdfW);
   shadow.contribution = path.throughput * value.f * light.radiance * (weight / light.pdfW);
-  shadow.ray = shadowRay(hit, light.wi, light.distance, mix32(path.salt ^ 0x51ed270bu) & ~kCameraRay);
+  setShadowRay(hit, light.wi, light.distance, mix32(path.salt ^ 0x51ed270bu) & ~kCameraRay, shadow.ray);
   const bool volume = context_.summaryOf(hit).volume;
   if (!path.media.empty() || volume) {
     MediaStack media = path.media;
@@ -153,9 +154,8 @@ void PathKernel::start(int x, int y, uint64_t key) {
   const SampleBlock camera = sampler_.block(key, 0);
   const Camera::CameraRay ray = cameraRayThrough(plan_, camera, x, y);
   const auto i = static_cast<size_t>(count_++);
-  sample_[i] = PathSample();
-  PathState& path = path_[i];
-  path = PathState();
+  std::construct_at(&sample_[i]);
+  PathState& path = *std::construct_at(&path_[i]);
   path.key = key;
   path.origin = ray.origin;
   path.direction = ray.direction;
@@ -189,20 +189,21 @@ void PathKernel::queueRay(int slot, PathState& path) {
 }
 
 void PathKernel::traceActive() {
+  const bool camera = path_[static_cast<size_t>(active_[0])].segments == 1;  // all paths start at once
   if (record_)
-    for (int a = 0; a < activeCount_; ++a) record_->push_back({rays_.get(a), false});
-  scene_.accel().intersect(rays_, activeCount_, hit_.data());
+    for (int a = 0; a < activeCount_; ++a) record_->push_back({rays_.get(a), false, camera});
+  scene_.accel().intersect(rays_, activeCount_, query_.data(), camera);
   rayCount += static_cast<uint64_t>(activeCount_);
 }
 
 // Fetches the vertices of all hits while nothing waits for them.
 void PathKernel::prefetchHits() const {
   for (int a = 0; a < activeCount_; ++a) {
-    const RayHit& hit = hit_[static_cast<size_t>(a)];
+    const RayHit& hit = query_[static_cast<size_t>(a)];
     if (hit.t < kInfinity) __builtin_prefetch(&scene_.mesh(hit.mesh).triangles[hit.triangle]);
   }
   for (int a = 0; a < activeCount_; ++a) {
-    const RayHit& hit = hit_[static_cast<size_t>(a)];
+    const RayHit& hit = query_[static_cast<size_t>(a)];
     if (!(hit.t < kInfinity)) continue;
     const TriangleMesh& mesh = scene_.mesh(hit.mesh);
     const glm::uvec3& index = mesh.triangles[hit.triangle];
@@ -213,15 +214,30 @@ void PathKernel::prefetchHits() const {
   }
 }
 
+// The steps that need nothing but the ray and the path's key come first, for all paths: short loops without branches,
+// of which the processor works on several rounds at once.
+void PathKernel::prepareShading() {
+  for (int a = 0; a < activeCount_; ++a) {
+    const auto i = static_cast<size_t>(a);
+    const PathState& path = path_[static_cast<size_t>(active_[i])];
+    if (query_[i].t < kInfinity) makeHit(scene_, query_[i], path.direction, hit_[i]);
+  }
+  for (int a = 0; a < activeCount_; ++a) {
+    const auto i = static_cast<size_t>(a);
+    const PathState& path = path_[static_cast<size_t>(active_[i])];
+    block_[i] = sampler_.block(path.key, static_cast<unsigned>(path.segments));
+  }
+}
+
 void PathKernel::shadeActive() {
+  prepareShading();
   int alive = 0;
   shadowCount_ = 0;
   for (int a = 0; a < activeCount_; ++a) {
     const int p = active_[static_cast<size_t>(a)];
     const auto i = static_cast<size_t>(p);
     bool hasShadow = false;
-    const bool goesOn = shade(path_[i], hit_[static_cast<size_t>(a)], sample_[i],
-                              shadow_[static_cast<size_t>(shadowCount_)], hasShadow);
+    const bool goesOn = shade(a, path_[i], sample_[i], shadow_[static_cast<size_t>(shadowCount_)], hasShadow);
     if (hasShadow) {
       shadowRays_.set(shadowCount_, shadow_[static_cast<size_t>(shadowCount_)].ray);
       shadowPath_[static_cast<size_t>(shadowCount_++)] = p;
@@ -249,14 +265,14 @@ void PathKernel::traceShadows() {
   shadowRayCount += static_cast<uint64_t>(shadowCount_);
 }
 
-bool PathKernel::shade(PathState& path, const RayHit& query, PathSample& sample, ShadowRay& shadow, bool& hasShadow) {
-  if (!(query.t < kInfinity)) {
+bool PathKernel::shade(int a, PathState& path, PathSample& sample, ShadowRay& shadow, bool& hasShadow) {
+  const auto i = static_cast<size_t>(a);
+  if (!(query_[i].t < kInfinity)) {
     if (observer_) observer_->onMiss();
     addEnvironment(path, sample);
     return false;
   }
-  Hit hit;
-  makeHit(scene_, query, path.direction, hit);
+  const Hit& hit = hit_[i];
   if (observer_) observer_->onHit(hit);
   path.throughput *= mediaTransmittance(scene_, path.media, hit.distance);
   const MaterialSummary& material = context_.summaryOf(hit);
@@ -277,7 +293,7 @@ bool PathKernel::shade(PathState& path, const RayHit& query, PathSample& sample,
   if (firstNonSpecular) recordFeatures(path, hit, bsdf, sample);
   if (path.segments >= plan_.settings.maxDepth) return false;
 
-  const SampleBlock block = sampler_.block(path.key, static_cast<unsigned>(path.segments));
+  const SampleBlock& block = block_[i];
   const bool twoSided = (lobes & (kLobeTransmission | kLobeDiffuseTransmission)) != 0;
   if (bsdf.hasNonDelta()) {
     hasShadow = sampleLight(path, hit, bsdf, twoSided, block, shadow);

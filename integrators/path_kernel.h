@@ -71,8 +71,10 @@ class PathKernel {
   void prefetchHits() const;
   void shadeActive();
   void traceShadows();
-  // One step of a path from a traced ray; true when it goes on. At most one shadow ray is appended.
-  bool shade(PathState& path, const RayHit& query, PathSample& sample, ShadowRay& shadow, bool& hasShadow);
+  // Hits and random numbers of all active paths.
+  void prepareShading();
+  // One step of the a-th active path from its traced ray; true when it goes on. At most one shadow ray is appended.
+  bool shade(int a, PathState& path, PathSample& sample, ShadowRay& shadow, bool& hasShadow);
   void addEnvironment(const PathState& path, PathSample& sample) const;
   void addEmission(const PathState& path, const Hit& hit, PathSample& sample) const;
   void addUnlit(PathState& path, const Hit& hit, PathSample& sample) const;
@@ -96,7 +98,9 @@ class PathKernel {
   std::array<PathState, kBatch> path_{};
   std::array<PathSample, kBatch> sample_{};
   RayBatch rays_;  // in the order of active_, like their hits
-  std::array<RayHit, kBatch> hit_;
+  std::array<RayHit, kBatch> query_;
+  std::array<Hit, kBatch> hit_;
+  std::array<SampleBlock, kBatch> block_;
   std::array<int, kBatch> active_;  // indices of the paths that go on
   int activeCount_ = 0;
   ShadowBatch shadowRays_;

@@ -12,6 +12,10 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/gtc/type_ptr.hpp>
 
+// For short functions that return more than two registers hold: a caller that reads such a result at once, eight floats
+// wide, waits until the single ones have left the store buffer.
+#define BRAID_INLINE [[gnu::always_inline]] inline
+
 namespace braid {
 
 using Vec2 = glm::vec2;
@@ -44,6 +48,9 @@ inline float select(bool c, float a, float b) {
 // sqrt that treats small negative rounding errors as zero.
 inline float safeSqrt(float x) { return std::sqrt(x > 0 ? x : 0.0f); }
 
+// |v| by component, without the branches of glm::abs.
+inline Vec3 magnitudes(const Vec3& v) { return {std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}; }
+
 inline float maxComponent(const Vec3& v) { return glm::max(v.x, glm::max(v.y, v.z)); }
 inline float minComponent(const Vec3& v) { return glm::min(v.x, glm::min(v.y, v.z)); }
 inline float average(const Vec3& v) { return (v.x + v.y + v.z) * (1.0f / 3.0f); }
@@ -62,7 +69,7 @@ struct Frame {
   Frame(const Vec3& tangent, const Vec3& bitangent, const Vec3& normal) : s(tangent), t(bitangent), n(normal) {}
 
   // Branchless basis from a unit normal (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
-  explicit Frame(const Vec3& normal) : n(normal) {
+  BRAID_INLINE explicit Frame(const Vec3& normal) : n(normal) {
     const float sign = std::copysign(1.0f, n.z);
     const float a = -1.0f / (sign + n.z);
     const float b = n.x * n.y * a;
@@ -70,8 +77,8 @@ struct Frame {
     t = Vec3(b, sign + sqr(n.y) * a, -n.y);
   }
 
-  Vec3 toLocal(const Vec3& v) const { return Vec3(glm::dot(v, s), glm::dot(v, t), glm::dot(v, n)); }
-  Vec3 toWorld(const Vec3& v) const { return s * v.x + t * v.y + n * v.z; }
+  BRAID_INLINE Vec3 toLocal(const Vec3& v) const { return Vec3(glm::dot(v, s), glm::dot(v, t), glm::dot(v, n)); }
+  BRAID_INLINE Vec3 toWorld(const Vec3& v) const { return s * v.x + t * v.y + n * v.z; }
 };
 
 // Axis-aligned bounding box; empty when lo > hi.

@@ -46,7 +46,8 @@ struct RayHit {
 // Rays are traced in packets of kPacket: also for unrelated rays that is faster than one at a time (0.74x the time in a
 // room of 38 triangles, 0.95x in one of a million), because a packet shares the work of the upper hierarchy.
 inline constexpr int kPacket = 8;
-inline constexpr int kBatch = 64;
+// So many that few packets are partly filled, so few that the caches hold them.
+inline constexpr int kBatch = 128;
 
 // Up to kBatch rays in Embree's own layout. Rays are written one by one as they come up, long before they are traced: a
 // packet filled just before its use would stall, because Embree loads eight lanes at once where single floats were
@@ -123,8 +124,10 @@ class Accel {
   // Builds the hierarchies; vertex and index buffers must outlive the Accel. Throws Error(OutOfMemory / Internal).
   void build(const AccelInput& input, const HitFilter* filter);
 
-  // Traces the first `count` rays of the batch; hits[i].t is infinity where ray i misses. Consumes the rays.
-  void intersect(RayBatch& rays, int count, RayHit* hits) const;
+  // Traces the first `count` rays of the batch; hits[i].t is infinity where ray i misses. Consumes the rays. `coherent`:
+  // neighbours run nearly alike, as camera rays do, and are traced as frusta. The hits are the same; path tracing a room
+  // of 38 triangles takes 0.96 of the time.
+  void intersect(RayBatch& rays, int count, RayHit* hits, bool coherent = false) const;
   // results[i] = whether anything lies in (0, tmax) of ray i. Consumes the rays.
   void occluded(ShadowBatch& rays, int count, bool* results) const;
 

@@ -25,7 +25,7 @@ Vec3 mapNormal(const Vec4& texel, float scale) {
 Vec3 unitNormal(const Vec3& n, const Vec3& fallback) {
   const float length2 = glm::dot(n, n);
   if (length2 > 1e-30f && length2 < 1e30f) return n * (1 / std::sqrt(length2));
-  const float largest = maxComponent(glm::abs(n));
+  const float largest = maxComponent(magnitudes(n));
   return largest > 0 && largest < kInfinity ? glm::normalize(n / largest) : fallback;
 }
 
@@ -58,7 +58,7 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
   hit.position = a + b + c;
   // TRAP: the bound must not be taken coordinate by coordinate: on the plane z = 0 it would be 0, yet Embree's distance
   // to that plane has the rounding errors of the triangle's other coordinates in it.
-  const Vec3 largest3 = glm::max(glm::max(glm::abs(p0), glm::abs(p1)), glm::abs(p2));
+  const Vec3 largest3 = glm::max(glm::max(magnitudes(p0), magnitudes(p1)), magnitudes(p2));
   hit.positionError = gammaBound(8) * maxComponent(largest3);
   Vec3 ng = glm::cross(p1 - p0, p2 - p0);
   Vec3 ns = mesh.normals.empty() ? ng : interpolate(mesh.normals, index, u, v);
@@ -67,10 +67,10 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
   if (query.instance != kNoInstance) {
     const GroupInstance& instance = scene.instances()[query.instance];
     const Mat3 linear(instance.toWorld);
-    const Mat3 absolute(glm::abs(linear[0]), glm::abs(linear[1]), glm::abs(linear[2]));
+    const Mat3 absolute(magnitudes(linear[0]), magnitudes(linear[1]), magnitudes(linear[2]));
     const Vec3 translation(instance.toWorld[3]);
     const Vec3 rounding = (1 + gammaBound(3)) * (absolute * Vec3(hit.positionError)) +
-                          gammaBound(4) * (absolute * glm::abs(hit.position) + glm::abs(translation));
+                          gammaBound(4) * (absolute * magnitudes(hit.position) + magnitudes(translation));
     hit.positionError = maxComponent(rounding);
     hit.position = linear * hit.position + translation;
     // Normals go by the inverse transpose; that keeps the front side also in a mirrored instance.

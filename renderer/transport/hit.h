@@ -30,11 +30,11 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
 // Lifts a point off its surface, along the normal and to the side that `direction` points to, by just more than the
 // point's error bound, so that a ray from there cannot hit the surface it leaves: no fixed epsilon, so 2 cm and 1600 m
 // scenes both work.
-inline Vec3 offsetOrigin(const Vec3& position, float error, const Vec3& ng, const Vec3& direction) {
+BRAID_INLINE Vec3 offsetOrigin(const Vec3& position, float error, const Vec3& ng, const Vec3& direction) {
   const float reach = 2 * error * (std::abs(ng.x) + std::abs(ng.y) + std::abs(ng.z));
   return position + std::copysign(reach, glm::dot(direction, ng)) * ng;
 }
-inline Vec3 offsetOrigin(const Hit& hit, const Vec3& direction) {
+BRAID_INLINE Vec3 offsetOrigin(const Hit& hit, const Vec3& direction) {
   return offsetOrigin(hit.position, hit.positionError, hit.ng, direction);
 }
 

@@ -61,7 +61,7 @@ void LightEmission::findMedia() {
       if (light < lights_.firstPositional()) {
         const EmissiveTriangle& e = scene_.emitters()[light];
         const Vec3 centre = e.p0 + (e.e1 + e.e2) * (1.0f / 3);
-        const float error = 1e-6f * maxComponent(glm::max(glm::abs(e.p0), glm::abs(centre)));
+        const float error = 1e-6f * maxComponent(glm::max(magnitudes(e.p0), magnitudes(centre)));
         around[i] = mediaAround(scene_, offsetOrigin(centre, error, e.normal, e.normal), e.normal);
       } else {
         around[i] = mediaAround(scene_, lights_.positional(light).position, Vec3(0.36f, 0.48f, 0.8f));
@@ -102,7 +102,7 @@ bool LightEmission::startOnTriangle(uint32_t light, Vec2 uPosition, Vec2 uDirect
   const Vec3 local = squareToCosineHemisphere(uDirection);
   out.normal = e.normal * side;
   out.position = e.p0 + b.x * e.e1 + b.y * e.e2;
-  out.positionError = 1e-6f * maxComponent(glm::max(glm::abs(e.p0), glm::abs(out.position)));
+  out.positionError = 1e-6f * maxComponent(glm::max(magnitudes(e.p0), magnitudes(out.position)));
   out.direction = renormalize(Frame(out.normal).toWorld(local));
   out.cosLight = local.z;
   out.finite = true;

@@ -10,17 +10,26 @@ namespace braid {
 inline constexpr float kShadowLength = 1 - 1e-4f;
 
 // From one point to another, both already lifted off their surfaces.
-inline RayQuery connectionRay(const Vec3& from, const Vec3& to, uint32_t salt) {
+BRAID_INLINE RayQuery connectionRay(const Vec3& from, const Vec3& to, uint32_t salt) {
   return {from, to - from, kShadowLength, salt};
 }
 
 // From a hit to a light in the unit direction wi; the distance is infinite for directional lights and the environment.
-inline RayQuery shadowRay(const Hit& hit, const Vec3& wi, float distance, uint32_t salt) {
-  const Vec3 origin = offsetOrigin(hit, wi);
+inline void setShadowRay(const Hit& hit, const Vec3& wi, float distance, uint32_t salt, RayQuery& ray) {
+  ray.origin = offsetOrigin(hit, wi);
+  ray.direction = wi;
+  ray.tmax = kInfinity;
+  ray.salt = salt;
+  if (!(distance < kInfinity)) return;
   // TRAP: aimed anew from the moved origin. On a large triangle the move is longer than the margin before a near light:
   // the light would hide itself.
-  if (distance < kInfinity) return connectionRay(origin, hit.position + wi * distance, salt);
-  return {origin, wi, kInfinity, salt};
+  ray.direction = hit.position + wi * distance - ray.origin;
+  ray.tmax = kShadowLength;
+}
+inline RayQuery shadowRay(const Hit& hit, const Vec3& wi, float distance, uint32_t salt) {
+  RayQuery ray;
+  setShadowRay(hit, wi, distance, salt, ray);
+  return ray;
 }
 
 }  // namespace braid

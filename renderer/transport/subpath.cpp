@@ -2,6 +2,7 @@
 #include "renderer/transport/subpath.h"
 
 #include <algorithm>
+#include <memory>
 
 namespace braid {
 
@@ -67,8 +68,7 @@ SubpathBatch::SubpathBatch(const TransportContext& context, const PassSampler& s
 void SubpathBatch::startCamera(uint64_t key, const Camera::CameraRay& ray, const MediaStack& media, double pdfPixel,
                                double lightPaths, bool orthographic) {
   BRAID_ASSERT(count_ < kBatch);
-  SubpathState& s = state_[static_cast<size_t>(count_++)];
-  s = SubpathState();
+  SubpathState& s = *std::construct_at(&state_[static_cast<size_t>(count_++)]);
   s.key = key;
   s.origin = ray.origin;
   s.direction = ray.direction;
@@ -79,8 +79,7 @@ void SubpathBatch::startCamera(uint64_t key, const Camera::CameraRay& ray, const
 
 void SubpathBatch::startLight(uint64_t key, const LightStart& start, const MediaStack& media) {
   BRAID_ASSERT(count_ < kBatch);
-  SubpathState& s = state_[static_cast<size_t>(count_++)];
-  s = SubpathState();
+  SubpathState& s = *std::construct_at(&state_[static_cast<size_t>(count_++)]);
   s.key = key;
   s.origin = start.finite && !start.delta
                  ? offsetOrigin(start.position, start.positionError, start.normal, start.direction)
@@ -98,8 +97,7 @@ void SubpathBatch::startLight(uint64_t key, const LightStart& start, const Media
 
 void SubpathBatch::startNothing() {
   BRAID_ASSERT(count_ < kBatch);
-  SubpathState& s = state_[static_cast<size_t>(count_++)];
-  s = SubpathState();
+  SubpathState& s = *std::construct_at(&state_[static_cast<size_t>(count_++)]);
   s.throughput = Spectrum(0);
 }
 
@@ -112,8 +110,20 @@ void SubpathBatch::queueRay(int slot, SubpathState& state) {
   rays_.set(slot, {state.origin, state.direction, kInfinity, state.salt});
 }
 
-SubpathBatch::Arrival SubpathBatch::arrive(SubpathState& state, const RayHit& query, Hit& hit) const {
-  makeHit(scene_, query, state.direction, hit);
+void SubpathBatch::trace(int active) {
+  const auto state = [&](int a) -> const SubpathState& {
+    return state_[static_cast<size_t>(active_[static_cast<size_t>(a)])];
+  };
+  const bool camera = settings_.transport == Transport::Radiance && state(0).segments == 1;
+  scene_.accel().intersect(rays_, active, queries_.data(), camera);
+  rayCount += static_cast<uint64_t>(active);
+  for (int a = 0; a < active; ++a) {
+    const RayHit& query = queries_[static_cast<size_t>(a)];
+    if (query.t < kInfinity) makeHit(scene_, query, state(a).direction, hits_[static_cast<size_t>(a)]);
+  }
+}
+
+SubpathBatch::Arrival SubpathBatch::arrive(SubpathState& state, const Hit& hit) const {
   state.throughput *= mediaTransmittance(scene_, state.media, hit.distance);
   state.travelled += hit.distance;
   const MaterialSummary& material = context_.summaryOf(hit);

@@ -126,8 +126,10 @@ class SubpathBatch {
  private:
   enum class Arrival { End, Null, Vertex };
   void queueRay(int slot, SubpathState& state);
+  // Traces the rays of all active walks and fills hits_.
+  void trace(int active);
   // Brings the walk to a hit: attenuation and the quantities' conversion to area.
-  Arrival arrive(SubpathState& state, const RayHit& query, Hit& hit) const;
+  Arrival arrive(SubpathState& state, const Hit& hit) const;
   void finishVertex(const SubpathState& state, const Hit& hit, SubpathVertex& vertex) const;
   bool scatter(SubpathState& state, const SubpathVertex& vertex) const;
   bool crossNullInterface(SubpathState& state, const Hit& hit) const;
@@ -141,7 +143,8 @@ class SubpathBatch {
   std::array<SubpathState, kBatch> state_;
   std::array<int, kBatch> active_;
   RayBatch rays_;
-  std::array<RayHit, kBatch> hits_;
+  std::array<RayHit, kBatch> queries_;
+  std::array<Hit, kBatch> hits_;
 };
 
 template <class OnHit, class OnMiss>
@@ -153,19 +156,17 @@ void SubpathBatch::run(const OnHit& onHit, const OnMiss& onMiss) {
     queueRay(active++, state_[static_cast<size_t>(i)]);
   }
   while (active > 0) {
-    scene_.accel().intersect(rays_, active, hits_.data());
-    rayCount += static_cast<uint64_t>(active);
+    trace(active);
     int alive = 0;
     for (int a = 0; a < active; ++a) {
       const int index = active_[static_cast<size_t>(a)];
       SubpathState& state = state_[static_cast<size_t>(index)];
-      const RayHit& query = hits_[static_cast<size_t>(a)];
-      if (!(query.t < kInfinity)) {
+      if (!(queries_[static_cast<size_t>(a)].t < kInfinity)) {
         onMiss(index, state);
         continue;
       }
-      Hit hit;
-      const Arrival arrival = arrive(state, query, hit);
+      const Hit& hit = hits_[static_cast<size_t>(a)];
+      const Arrival arrival = arrive(state, hit);
       if (arrival == Arrival::End) continue;
       if (arrival == Arrival::Vertex) {
         const uint32_t lobes = context_.summaryOf(hit).lobes;
