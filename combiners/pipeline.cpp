@@ -10,6 +10,7 @@
 #include "combiners/plane_mean.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
+#include "renderer/core/pixel_buffer.h"
 #include "renderer/core/stopwatch.h"
 
 namespace braid {
@@ -204,6 +205,12 @@ void Runner::finish() {
   for (PipelineOutput& out : result.outputs) undoExposure(out.result, result.exposure);
 }
 
+// What steps leave to one another is given back after the last, also when one throws: whoever writes the images then
+// needs memory of other kinds.
+struct KeptPixels {
+  ~KeptPixels() { dropKeptPixels(); }
+};
+
 Attribute textAttribute(const std::string& name, const std::string& value) {
   Attribute a;
   a.name = name;
@@ -227,6 +234,7 @@ PlanesRead planesRead(const Recipe& recipe) {
 PipelineResult runPipeline(const Estimates& estimates, const std::vector<std::string>& wanted,
                            const PipelineOptions& options) {
   checkSizes(estimates);
+  const KeptPixels kept{};
   const Recipe recipe = makeRecipe(factsOf(estimates), wanted, options.roles);
   Runner runner(options);
   runner.normalise(estimates, recipe);

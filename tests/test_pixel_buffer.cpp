@@ -14,7 +14,7 @@ using namespace braid;
 namespace {
 
 constexpr int kWidth = 1024;
-// Of the heap, of the smallest and of a larger mapped buffer, and of one too large to be kept.
+// Of the heap, of the smallest and of larger mapped buffers.
 constexpr int kHeights[] = {1, 255, 256, 700, 20000};
 
 bool all(const Plane<float>& plane, float value) {

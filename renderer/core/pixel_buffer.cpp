@@ -3,6 +3,8 @@
 
 #include <sys/mman.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <mutex>
 #include <new>
 #include <vector>
@@ -13,26 +15,48 @@ namespace {
 
 constexpr std::align_val_t kAlignment{64};
 
-// Freed buffers, the last one at the end.
-class KeptBuffers {
+// Mapped buffers are whole pages, so that any part of one can be given back to the system.
+constexpr size_t wholePages(size_t bytes) {
+  constexpr size_t kPage = 4096;
+  return (bytes + kPage - 1) / kPage * kPage;
+}
+
+// Mapped buffers: what is in use is counted, what was freed is kept, the last one at the end.
+class MappedBuffers {
  public:
-  // One of exactly this size; null: there is none.
+  // Memory of a kept buffer, the latest of exactly this size or a part of the smallest larger one; null: there is none,
+  // and older ones have made room for a new one.
   void* take(size_t bytes) {
     const std::lock_guard lock(mutex_);
-    for (size_t i = kept_.size(); i > 0; --i)
-      if (kept_[i - 1].bytes == bytes) return remove(i - 1);
+    used_ += bytes;
+    mostUsed_ = std::max(mostUsed_, used_);
+    size_t best = kept_.size();
+    for (size_t i = kept_.size(); i > 0; --i) {
+      const size_t size = kept_[i - 1].bytes;
+      if (size == bytes) return remove(i - 1);
+      if (size > bytes && (best == kept_.size() || size < kept_[best].bytes)) best = i - 1;
+    }
+    if (best < kept_.size()) return cut(best, bytes);
+    while (used_ + held_ > mostUsed_) dropOldest();
     return nullptr;
   }
 
   void give(void* memory, size_t bytes) noexcept {
     const std::lock_guard lock(mutex_);
+    used_ -= bytes;
     try {
       kept_.push_back({memory, bytes});
       held_ += bytes;
     } catch (const std::bad_alloc&) {
       munmap(memory, bytes);
     }
-    while (held_ > kKeptBytes) dropOldest();
+  }
+
+  // What take() promised could not be had.
+  void failed(size_t bytes) noexcept {
+    const std::lock_guard lock(mutex_);
+    used_ -= bytes;
+    mostUsed_ = used_ + held_;
   }
 
   void drop() noexcept {
@@ -53,6 +77,15 @@ class KeptBuffers {
     return buffer.memory;
   }
 
+  void* cut(size_t i, size_t bytes) {
+    Buffer& buffer = kept_[i];
+    void* memory = buffer.memory;
+    buffer.memory = static_cast<std::byte*>(memory) + bytes;
+    buffer.bytes -= bytes;
+    held_ -= bytes;
+    return memory;
+  }
+
   void dropOldest() noexcept {
     const size_t bytes = kept_.front().bytes;
     munmap(remove(0), bytes);
@@ -60,13 +93,13 @@ class KeptBuffers {
 
   std::mutex mutex_;
   std::vector<Buffer> kept_;
-  size_t held_ = 0;
+  size_t held_ = 0, used_ = 0, mostUsed_ = 0;  // bytes; used_ + held_ <= mostUsed_
 };
 
 // Outlives every plane, those in static storage too.
-KeptBuffers& keptBuffers() {
-  static KeptBuffers& kept = *new KeptBuffers;
-  return kept;
+MappedBuffers& mappedBuffers() {
+  static MappedBuffers& buffers = *new MappedBuffers;
+  return buffers;
 }
 
 void* mapped(size_t bytes) {
@@ -82,24 +115,26 @@ void* mapped(size_t bytes) {
 void* allocatePixels(size_t bytes, bool zeros) {
   if (bytes == 0) return nullptr;
   const bool small = bytes < kMappedBytes;
-  void* memory = small ? operator new(bytes, kAlignment) : keptBuffers().take(bytes);
+  const size_t pages = wholePages(bytes);
+  void* memory = small ? operator new(bytes, kAlignment) : mappedBuffers().take(pages);
   if (memory) return zeros ? std::memset(memory, 0, bytes) : memory;
-  memory = mapped(bytes);
+  memory = mapped(pages);
   if (memory) return memory;
-  keptBuffers().drop();
-  memory = mapped(bytes);
-  if (!memory) throw std::bad_alloc();
-  return memory;
+  mappedBuffers().drop();
+  memory = mapped(pages);
+  if (memory) return memory;
+  mappedBuffers().failed(pages);
+  throw std::bad_alloc();
 }
 
 void freePixels(void* memory, size_t bytes) noexcept {
   if (!memory) return;
   if (bytes < kMappedBytes)
     operator delete(memory, kAlignment);
-  else if (bytes <= kKeptBytes)
-    keptBuffers().give(memory, bytes);
   else
-    munmap(memory, bytes);
+    mappedBuffers().give(memory, wholePages(bytes));
 }
+
+void dropKeptPixels() noexcept { mappedBuffers().drop(); }
 
 }  // namespace braid

@@ -18,16 +18,17 @@ namespace braid {
 // Bytes from which on a buffer is mapped by itself instead of taken from the heap.
 constexpr size_t kMappedBytes = size_t(1) << 20;
 
-// Bytes of freed buffers that are kept at most.
-constexpr size_t kKeptBytes = size_t(64) << 20;
-
 // For buffers of which the next loop writes every value.
 struct Unfilled {};
 inline constexpr Unfilled kUnfilled;
 
-// Memory aligned to 64 bytes that holds zeros, or anything. Throws std::bad_alloc.
+// Memory aligned to 64 bytes that holds zeros, or anything. Freed buffers are kept for the next of their size, because
+// memory that no one has touched lately is slow, and because of them the process never holds more than the most that
+// was in use at once. Throws std::bad_alloc.
 void* allocatePixels(size_t bytes, bool zeros);
 void freePixels(void* memory, size_t bytes) noexcept;
+// Gives what is kept back to the system: for the end of work that takes much memory.
+void dropKeptPixels() noexcept;
 
 // So many values of a plain type, all the same at first; owned, and copied with it.
 template <class T>
