@@ -74,3 +74,23 @@ TEST_CASE("Buffers that live at once never share memory, and lie as vectors want
     }
   }
 }
+
+TEST_CASE("A freed buffer serves smaller ones, each with a part of its own, until all is given back") {
+  dropKeptPixels();
+  const float *begin = nullptr, *end = nullptr;
+  {
+    const Plane<float> large(kWidth, 1000, 1);
+    begin = large.data.begin();
+    end = large.data.end();
+  }
+  std::vector<Plane<float>> parts;
+  for (const int height : {256, 300, 300}) parts.emplace_back(kWidth, height, static_cast<float>(parts.size()));
+  for (size_t k = 0; k < parts.size(); ++k) {
+    CHECK(parts[k].data.begin() >= begin);
+    CHECK(parts[k].data.end() <= end);
+    CHECK(all(parts[k], static_cast<float>(k)));
+  }
+  parts.clear();
+  dropKeptPixels();
+  CHECK(all(Plane<float>(kWidth, 1000), 0));
+}
