@@ -189,10 +189,9 @@ void PathKernel::queueRay(int slot, PathState& path) {
 }
 
 void PathKernel::traceActive() {
-  const bool camera = path_[static_cast<size_t>(active_[0])].segments == 1;  // all paths start at once
   if (record_)
-    for (int a = 0; a < activeCount_; ++a) record_->push_back({rays_.get(a), false, camera});
-  scene_.accel().intersect(rays_, activeCount_, query_.data(), camera);
+    for (int a = 0; a < activeCount_; ++a) record_->push_back({rays_.get(a), false});
+  scene_.accel().intersect(rays_, activeCount_, query_.data());
   rayCount += static_cast<uint64_t>(activeCount_);
 }
 

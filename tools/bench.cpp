@@ -77,14 +77,14 @@ void traceLikeRenderer(const Accel& accel, const std::vector<RecordedRay>& rays)
   std::array<RayHit, kBatch> hits;
   std::array<bool, kBatch> hidden;
   for (size_t i = 0; i < rays.size();) {
-    const bool shadow = rays[i].shadow, camera = rays[i].camera;
+    const bool shadow = rays[i].shadow;
     int count = 0;
-    for (; count < kBatch && i < rays.size() && rays[i].shadow == shadow && rays[i].camera == camera; ++count, ++i)
+    for (; count < kBatch && i < rays.size() && rays[i].shadow == shadow; ++count, ++i)
       shadow ? shadows.set(count, rays[i]) : batch.set(count, rays[i]);
     if (shadow)
       accel.occluded(shadows, count, hidden.data());
     else
-      accel.intersect(batch, count, hits.data(), camera);
+      accel.intersect(batch, count, hits.data());
   }
 }
 

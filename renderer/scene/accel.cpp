@@ -41,12 +41,7 @@ RTCRay singleRay(const RayQuery& r) {
 #ifdef BRAID_EMBREE4
 void embreeIntersect1(RTCScene scene, RTCRayHit& q) { rtcIntersect1(scene, &q, nullptr); }
 void embreeOccluded1(RTCScene scene, RTCRay& q) { rtcOccluded1(scene, &q, nullptr); }
-void embreeIntersect8(const int* valid, RTCScene scene, RTCRayHit8& q, bool coherent) {
-  RTCIntersectArguments arguments;
-  rtcInitIntersectArguments(&arguments);
-  if (coherent) arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
-  rtcIntersect8(valid, scene, &q, &arguments);
-}
+void embreeIntersect8(const int* valid, RTCScene scene, RTCRayHit8& q) { rtcIntersect8(valid, scene, &q, nullptr); }
 void embreeOccluded8(const int* valid, RTCScene scene, RTCRay8& q) { rtcOccluded8(valid, scene, &q, nullptr); }
 #else
 RTCIntersectContext plainContext() {
@@ -62,9 +57,8 @@ void embreeOccluded1(RTCScene scene, RTCRay& q) {
   RTCIntersectContext context = plainContext();
   rtcOccluded1(scene, &context, &q);
 }
-void embreeIntersect8(const int* valid, RTCScene scene, RTCRayHit8& q, bool coherent) {
+void embreeIntersect8(const int* valid, RTCScene scene, RTCRayHit8& q) {
   RTCIntersectContext context = plainContext();
-  if (coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   rtcIntersect8(valid, scene, &context, &q);
 }
 void embreeOccluded8(const int* valid, RTCScene scene, RTCRay8& q) {
@@ -173,7 +167,7 @@ void Accel::resolve(uint32_t geometry, uint32_t instance, RayHit& hit) const {
   }
 }
 
-void Accel::intersect(RayBatch& rays, int count, RayHit* hits, bool coherent) const {
+void Accel::intersect(RayBatch& rays, int count, RayHit* hits) const {
   for (int first = 0; first < count; first += kPacket) {
     const int lanes = std::min(kPacket, count - first);
     if (!packets_ || lanes == 1) {
@@ -186,7 +180,7 @@ void Accel::intersect(RayBatch& rays, int count, RayHit* hits, bool coherent) co
       valid[i] = i < lanes ? -1 : 0;
       query.hit.geomID[i] = query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     }
-    embreeIntersect8(valid, scene_, query, coherent);
+    embreeIntersect8(valid, scene_, query);
     for (int i = 0; i < lanes; ++i) {
       RayHit& hit = hits[first + i];
       const bool found = query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;

@@ -124,10 +124,10 @@ class Accel {
   // Builds the hierarchies; vertex and index buffers must outlive the Accel. Throws Error(OutOfMemory / Internal).
   void build(const AccelInput& input, const HitFilter* filter);
 
-  // Traces the first `count` rays of the batch; hits[i].t is infinity where ray i misses. Consumes the rays. `coherent`:
-  // neighbours run nearly alike, as camera rays do, and are traced as frusta. The hits are the same; path tracing a room
-  // of 38 triangles takes 0.96 of the time.
-  void intersect(RayBatch& rays, int count, RayHit* hits, bool coherent = false) const;
+  // Traces the first `count` rays of the batch; hits[i].t is infinity where ray i misses. Consumes the rays.
+  // TRAP: not as frusta (Embree's coherent rays), although camera rays would be faster: of two surfaces in one place
+  // they meet another one than single rays do, and then paths from the camera and from lights see different scenes.
+  void intersect(RayBatch& rays, int count, RayHit* hits) const;
   // results[i] = whether anything lies in (0, tmax) of ray i. Consumes the rays.
   void occluded(ShadowBatch& rays, int count, bool* results) const;
 

@@ -14,7 +14,6 @@ namespace braid {
 // Records the rays of a render, so that a benchmark can trace exactly the same ones again without shading.
 struct RecordedRay : RayQuery {
   bool shadow = false;
-  bool camera = false;
 };
 
 // What shading asks of every material, in eight bytes: materials themselves are large.

@@ -114,8 +114,7 @@ void SubpathBatch::trace(int active) {
   const auto state = [&](int a) -> const SubpathState& {
     return state_[static_cast<size_t>(active_[static_cast<size_t>(a)])];
   };
-  const bool camera = settings_.transport == Transport::Radiance && state(0).segments == 1;
-  scene_.accel().intersect(rays_, active, queries_.data(), camera);
+  scene_.accel().intersect(rays_, active, queries_.data());
   rayCount += static_cast<uint64_t>(active);
   for (int a = 0; a < active; ++a) {
     const RayHit& query = queries_[static_cast<size_t>(a)];
