@@ -154,6 +154,7 @@ void PathKernel::start(int x, int y, uint64_t key) {
   const SampleBlock camera = sampler_.block(key, 0);
   const Camera::CameraRay ray = cameraRayThrough(plan_, camera, x, y);
   const auto i = static_cast<size_t>(count_++);
+  // In place: assigned, they would take the way over the stack.
   std::construct_at(&sample_[i]);
   PathState& path = *std::construct_at(&path_[i]);
   path.key = key;
@@ -213,17 +214,14 @@ void PathKernel::prefetchHits() const {
   }
 }
 
-// The steps that need nothing but the ray and the path's key come first, for all paths: short loops without branches,
-// of which the processor works on several rounds at once.
+// What needs nothing but the ray and the path's key comes first, for all paths: a short loop, of which the processor
+// works on several rounds at once.
 void PathKernel::prepareShading() {
   for (int a = 0; a < activeCount_; ++a) {
     const auto i = static_cast<size_t>(a);
+    if (!(query_[i].t < kInfinity)) continue;
     const PathState& path = path_[static_cast<size_t>(active_[i])];
-    if (query_[i].t < kInfinity) makeHit(scene_, query_[i], path.direction, hit_[i]);
-  }
-  for (int a = 0; a < activeCount_; ++a) {
-    const auto i = static_cast<size_t>(a);
-    const PathState& path = path_[static_cast<size_t>(active_[i])];
+    makeHit(scene_, query_[i], path.direction, hit_[i]);
     block_[i] = sampler_.block(path.key, static_cast<unsigned>(path.segments));
   }
 }
@@ -234,9 +232,15 @@ void PathKernel::shadeActive() {
   shadowCount_ = 0;
   for (int a = 0; a < activeCount_; ++a) {
     const int p = active_[static_cast<size_t>(a)];
-    const auto i = static_cast<size_t>(p);
+    const auto i = static_cast<size_t>(p), ray = static_cast<size_t>(a);
+    if (!(query_[ray].t < kInfinity)) {
+      if (observer_) observer_->onMiss();
+      addEnvironment(path_[i], sample_[i]);
+      continue;
+    }
     bool hasShadow = false;
-    const bool goesOn = shade(a, path_[i], sample_[i], shadow_[static_cast<size_t>(shadowCount_)], hasShadow);
+    const bool goesOn =
+        shade(path_[i], hit_[ray], block_[ray], sample_[i], shadow_[static_cast<size_t>(shadowCount_)], hasShadow);
     if (hasShadow) {
       shadowRays_.set(shadowCount_, shadow_[static_cast<size_t>(shadowCount_)].ray);
       shadowPath_[static_cast<size_t>(shadowCount_++)] = p;
@@ -264,14 +268,8 @@ void PathKernel::traceShadows() {
   shadowRayCount += static_cast<uint64_t>(shadowCount_);
 }
 
-bool PathKernel::shade(int a, PathState& path, PathSample& sample, ShadowRay& shadow, bool& hasShadow) {
-  const auto i = static_cast<size_t>(a);
-  if (!(query_[i].t < kInfinity)) {
-    if (observer_) observer_->onMiss();
-    addEnvironment(path, sample);
-    return false;
-  }
-  const Hit& hit = hit_[i];
+bool PathKernel::shade(PathState& path, const Hit& hit, const SampleBlock& block, PathSample& sample, ShadowRay& shadow,
+                       bool& hasShadow) {
   if (observer_) observer_->onHit(hit);
   path.throughput *= mediaTransmittance(scene_, path.media, hit.distance);
   const MaterialSummary& material = context_.summaryOf(hit);
@@ -292,7 +290,6 @@ bool PathKernel::shade(int a, PathState& path, PathSample& sample, ShadowRay& sh
   if (firstNonSpecular) recordFeatures(path, hit, bsdf, sample);
   if (path.segments >= plan_.settings.maxDepth) return false;
 
-  const SampleBlock& block = block_[i];
   const bool twoSided = (lobes & (kLobeTransmission | kLobeDiffuseTransmission)) != 0;
   if (bsdf.hasNonDelta()) {
     hasShadow = sampleLight(path, hit, bsdf, twoSided, block, shadow);

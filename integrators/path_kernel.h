@@ -71,10 +71,11 @@ class PathKernel {
   void prefetchHits() const;
   void shadeActive();
   void traceShadows();
-  // Hits and random numbers of all active paths.
+  // Hits and random numbers of all active paths whose rays hit something.
   void prepareShading();
-  // One step of the a-th active path from its traced ray; true when it goes on. At most one shadow ray is appended.
-  bool shade(int a, PathState& path, PathSample& sample, ShadowRay& shadow, bool& hasShadow);
+  // One step of a path from a hit; true when it goes on. At most one shadow ray is appended.
+  bool shade(PathState& path, const Hit& hit, const SampleBlock& block, PathSample& sample, ShadowRay& shadow,
+             bool& hasShadow);
   void addEnvironment(const PathState& path, PathSample& sample) const;
   void addEmission(const PathState& path, const Hit& hit, PathSample& sample) const;
   void addUnlit(PathState& path, const Hit& hit, PathSample& sample) const;

@@ -22,9 +22,9 @@ constexpr size_t kMappedBytes = size_t(1) << 20;
 struct Unfilled {};
 inline constexpr Unfilled kUnfilled;
 
-// Memory aligned to 64 bytes that holds zeros, or anything. Freed buffers are kept for the next of their size, because
-// memory that no one has touched lately is slow, and because of them the process never holds more than the most that
-// was in use at once. Throws std::bad_alloc.
+// Memory aligned to 64 bytes that holds zeros, or anything. Freed buffers are kept and serve, whole or in parts, the
+// next ones, because memory that no one has touched lately is slow. What is in use and kept together is never more than
+// the most that was in use at once. Throws std::bad_alloc.
 void* allocatePixels(size_t bytes, bool zeros);
 void freePixels(void* memory, size_t bytes) noexcept;
 // Gives what is kept back to the system: for the end of work that takes much memory.

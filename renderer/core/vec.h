@@ -12,8 +12,8 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/gtc/type_ptr.hpp>
 
-// For short functions that return more than two registers hold: a caller that reads such a result at once, eight floats
-// wide, waits until the single ones have left the store buffer.
+// For short functions of vectors: called, they pass them through memory, and whoever then reads eight floats at once
+// waits until the single ones have left the store buffer.
 #define BRAID_INLINE [[gnu::always_inline]] inline
 
 namespace braid {

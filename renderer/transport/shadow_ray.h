@@ -10,7 +10,7 @@ namespace braid {
 inline constexpr float kShadowLength = 1 - 1e-4f;
 
 // From one point to another, both already lifted off their surfaces.
-BRAID_INLINE RayQuery connectionRay(const Vec3& from, const Vec3& to, uint32_t salt) {
+inline RayQuery connectionRay(const Vec3& from, const Vec3& to, uint32_t salt) {
   return {from, to - from, kShadowLength, salt};
 }
 
@@ -26,6 +26,7 @@ inline void setShadowRay(const Hit& hit, const Vec3& wi, float distance, uint32_
   ray.direction = hit.position + wi * distance - ray.origin;
   ray.tmax = kShadowLength;
 }
+
 inline RayQuery shadowRay(const Hit& hit, const Vec3& wi, float distance, uint32_t salt) {
   RayQuery ray;
   setShadowRay(hit, wi, distance, salt, ray);
