@@ -22,10 +22,24 @@ DoubleShrinkage doubleShrinkage(double unbiasedError, double biasedError, double
 // to too few of its neighbours (ALGORITHMS 1.4). At least 10⁻⁸ (x² + 10⁻⁴).
 Plane<float> unbiasedError(const Estimate& unbiased, const Rgb<float>& variance);
 
-// E_b: variance plus squared bias, averaged over channels and smoothed over 13 x 13 pixels along surfaces, for bias has
-// structure. With an estimate of the bias (photon maps, ALGORITHMS 6.2) gamma² is its square less its variance, not
-// below 0; else, with halves, the error across halves (4.4), which holds any bias; else (Y - X)² less the variance,
-// which is too small, for Y has seen the samples of X. At least 10⁻⁸ (y² + 10⁻⁴).
+// The square of the bias that an image estimates of itself less the variance of that estimate, averaged over channels:
+// unbiased but noisy, with negative values.
+Plane<float> squaredBiasSamples(const Estimate& photonMap);
+
+// What the squared error of an image that estimates its own bias (a photon map; ALGORITHMS 6.2) is made of: its
+// variance and gamma², the square of its bias less the variance of that estimate, not below 0. Averaged over channels
+// and smoothed over 13 x 13 pixels along surfaces, for bias has structure; where a pixel's own bias is beyond three
+// deviations, gamma² is no less than it says.
+struct PhotonMapError {
+  Plane<float> variance, squaredBias;
+};
+PhotonMapError photonMapError(const Estimate& photonMap, const Features* features);
+// Their sum, at least 10⁻⁸ (y² + 10⁻⁴).
+Plane<float> totalError(const Estimate& photonMap, const PhotonMapError& error);
+
+// E_b: that sum. Without an estimate of the bias, but with halves, the error
+// across halves (4.4), which holds any bias; else (Y - X)² less the variance, which is too small, for Y has seen the
+// samples of X. At least 10⁻⁸ (y² + 10⁻⁴).
 Plane<float> biasedError(const Estimate& biased, const Estimate& unbiased, const Rgb<float>& variance,
                          const Features* features);
 

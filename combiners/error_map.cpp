@@ -12,6 +12,8 @@ namespace braid {
 
 namespace {
 
+constexpr int kBiasRadius = 7;
+
 double squaredDifference(const Rgb<float>& a, const Rgb<float>& b, size_t i, size_t c) {
   const double d = static_cast<double>(a[c][i]) - static_cast<double>(b[c][i]);
   return d * d;
@@ -20,6 +22,19 @@ double squaredDifference(const Rgb<float>& a, const Rgb<float>& b, size_t i, siz
 Plane<float> varianceSamples(const Rgb<float> (&halves)[2]) {
   return channelMean(halves[0].width(), halves[0].height(),
                      [&](size_t i, size_t c) { return 0.25 * squaredDifference(halves[0], halves[1], i, c); });
+}
+
+// What errors are measured in to be relative: the squared brightness + 0.01.
+Plane<double> relativeUnits(const Rgb<float>& guide) {
+  Plane<double> unit(guide.width(), guide.height());
+  parallelChunks(unit.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      double level = 0;
+      for (size_t c = 0; c < 3; ++c) level += static_cast<double>(guide[c][i]) / 3;
+      unit[i] = level * level + 0.01;
+    }
+  });
+  return unit;
 }
 
 }  // namespace
@@ -60,30 +75,43 @@ Plane<float> squaredErrorSamples(const Rgb<float> (&halves)[2], const Estimate& 
 }
 
 Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
-                      const Rgb<float>& guide, double biasOfHalves) {
+                      const Rgb<float>& guide, bool follows) {
   const int width = guide.width(), height = guide.height();
   const Plane<float> samples = squaredErrorSamples(halves, unbiased, variance);
   const Plane<float> spread = varianceSamples(halves);
-  Plane<double> unit(width, height), noise(width, height), bias(width, height);
+  const Plane<double> unit = relativeUnits(guide);
+  Plane<double> noise(width, height), bias(width, height), level;
+  if (follows) level = Plane<double>(width, height);
   parallelChunks(unit.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
-      double v = 0, level = 0;
-      for (size_t c = 0; c < 3; ++c) {
-        v += static_cast<double>(variance[c][i]) / 3;
-        level += static_cast<double>(guide[c][i]) / 3;
-      }
-      unit[i] = level * level + 0.01;
+      double v = 0;
+      for (size_t c = 0; c < 3; ++c) v += static_cast<double>(variance[c][i]) / 3;
       noise[i] = static_cast<double>(spread[i]) / unit[i];
       bias[i] = (static_cast<double>(samples[i]) - static_cast<double>(spread[i])) / (unit[i] + v);
+      if (follows) level[i] = v / (unit[i] + v);
     }
   });
   noise = boxMean(noise, 1);
-  bias = boxMean(bias, 7);
+  bias = boxMean(bias, kBiasRadius);
+  if (follows) level = boxMean(level, kBiasRadius);
   Plane<float> out(width, height, kUnfilled);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i)
-      out[i] = finiteFloat(unit[i] * (noise[i] + biasOfHalves * std::max(0.0, bias[i])));
+    for (size_t i = begin; i < end; ++i) {
+      const double ofHalves = std::max(0.0, bias[i]), v2 = follows ? 2 * level[i] : 0;
+      const double share = follows ? v2 / std::max(v2 + 2 * noise[i] + ofHalves, 1e-300) : 1;
+      out[i] = finiteFloat(unit[i] * (noise[i] + share * ofHalves));
+    }
   });
+  return out;
+}
+
+Plane<float> smoothedSquaredBias(const Plane<float>& squaredBias, const Rgb<float>& guide) {
+  const Plane<double> unit = relativeUnits(guide);
+  Plane<double> mean(guide.width(), guide.height());
+  for (size_t i = 0; i < mean.size(); ++i) mean[i] = static_cast<double>(squaredBias[i]) / unit[i];
+  mean = boxMean(mean, kBiasRadius);
+  Plane<float> out(guide.width(), guide.height());
+  for (size_t i = 0; i < out.size(); ++i) out[i] = finiteFloat(unit[i] * std::max(0.0, mean[i]));
   return out;
 }
 

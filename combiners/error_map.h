@@ -29,9 +29,14 @@ Plane<float> squaredErrorSamples(const Rgb<float> (&halves)[2], const Estimate& 
 // anything that they can have. Its sum over the image is meant, not its pixels: where it is smallest it is too small,
 // by selection. The halves must be independent of each other.
 //
-// The squared bias is that of the halves, which have seen half of the samples; `biasOfHalves` is what of it the image
-// has: 1 where bias does not fall with the samples.
+// The squared bias is that of the halves, which have seen half of the samples. That of an image which shares out
+// between x and something with the squared error b² as their errors ask for it, as James and Stein's does, falls with
+// v: its error is e = v b² / (v + b²), that of a half e' = 2 v b² / (2 v + b²), so that e = e' 2 v / (2 v + e'). With
+// `follows` the squared bias is multiplied by that factor, with means over 15 x 15 pixels.
 Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
-                      const Rgb<float>& guide, double biasOfHalves = 1);
+                      const Rgb<float>& guide, bool follows = false);
+
+// u max(0, box15(squaredBias / u)), u as above: of unbiased samples of a squared bias, which may be negative.
+Plane<float> smoothedSquaredBias(const Plane<float>& squaredBias, const Rgb<float>& guide);
 
 }  // namespace braid

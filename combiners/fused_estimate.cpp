@@ -53,52 +53,49 @@ void countMissingLight(Plane<float>& error, const Estimate& unbiased, const Rgb<
   }
 }
 
-// What of a photon map's squared error is not noise.
-Plane<float> squaredBiasOf(const Estimate& biased, const Plane<float>& error) {
-  const Rgb<float> variance = meanVariance(biased);
-  const Plane<double> noise =
-      boxMean(channelMean(variance, [&](size_t i, size_t c) { return static_cast<double>(variance[c][i]); }), kRadius);
-  Plane<float> out(error.width, error.height);
-  for (size_t i = 0; i < out.size(); ++i) out[i] = finiteFloat(std::max(0.0, static_cast<double>(error[i]) - noise[i]));
-  return out;
-}
-
 double squaredShare(const WeightMaps& weights, size_t k, size_t i) {
   const auto w = static_cast<double>(weights.of(k, 0)[i]);
   return w * w;
 }
 
-// The variance of the combination, to which the squared errors of photon maps count whole.
-Rgb<float> combinedVariance(const WeightMaps& weights, const Rgb<float>& variance,
-                            const std::vector<Plane<float>>& errors) {
-  Rgb<float> out(variance.width(), variance.height());
-  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      double photons = 0;
-      for (size_t k = 1; k < errors.size(); ++k)
-        photons += squaredShare(weights, k, i) * static_cast<double>(errors[k][i]);
-      for (size_t c = 0; c < 3; ++c)
-        out[c][i] = finiteFloat(squaredShare(weights, 0, i) * static_cast<double>(variance[c][i]) + photons);
-    }
+// Adds what of the variance of the k-th image is left in the combination. That of the pixel itself: smoothed, an
+// outlier's would make noise of its clean neighbours, which filters would then replace by the outlier.
+void addVariance(Rgb<float>& sum, const WeightMaps& weights, size_t k, const Rgb<float>& variance) {
+  parallelChunks(sum.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t i = begin; i < end; ++i)
+        sum[c][i] = finiteFloat(static_cast<double>(sum[c][i]) +
+                                squaredShare(weights, k, i) * static_cast<double>(variance[c][i]));
   });
-  return out;
+}
+
+// The same of a squared bias, for one plane.
+void addSquaredBias(Plane<float>& sum, const WeightMaps& weights, size_t k, const Plane<float>& squaredBias) {
+  parallelChunks(sum.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i)
+      sum[i] =
+          finiteFloat(static_cast<double>(sum[i]) + squaredShare(weights, k, i) * static_cast<double>(squaredBias[i]));
+  });
 }
 
 }  // namespace
 
 FusedEstimate fusedEstimate(const Estimate& unbiased, const std::vector<const Estimate*>& biased,
                             const Features* features) {
-  if (biased.empty()) return {unbiased, {}};
+  if (biased.empty()) return {unbiased, {}, {}};
   const Rgb<float> variance = meanVariance(unbiased);
+  const int width = variance.width(), height = variance.height();
   std::vector<const Estimate*> inputs = {&unbiased};
-  std::vector<Plane<float>> errors = {unbiasedError(unbiased, variance)};
+  std::vector<Plane<float>> errors = {unbiasedError(unbiased, variance)}, squaredBiases;
   for (const Estimate* b : biased) {
     inputs.push_back(b);
-    errors.push_back(biasedError(*b, unbiased, variance, features));
+    PhotonMapError error = photonMapError(*b, features);
+    errors.push_back(totalError(*b, error));
+    squaredBiases.push_back(std::move(error.squaredBias));
     countMissingLight(errors[0], unbiased, variance, *b, errors.back());
   }
   const WeightMaps weights = inverseErrorWeights(errors);
-  FusedEstimate out{weightedEstimate(weights, inputs), Plane<float>(variance.width(), variance.height())};
+  FusedEstimate out{weightedEstimate(weights, inputs), Rgb<float>(width, height), Plane<float>(width, height)};
   out.image.name = unbiased.name;
   out.image.correlation = unbiased.correlation;
   out.image.passes = unbiased.passes;
@@ -108,12 +105,16 @@ FusedEstimate fusedEstimate(const Estimate& unbiased, const std::vector<const Es
       for (const Estimate* e : inputs) quarters.push_back(&e->quarter[q]);
       out.image.quarter.push_back(weightedImage(weights, quarters));
     }
-  out.image.variance = combinedVariance(weights, variance, errors);
+  addVariance(out.noise, weights, 0, variance);
+  Plane<float> claimed(width, height);
   for (size_t k = 1; k < inputs.size(); ++k) {
-    const Plane<float> bias = squaredBiasOf(*inputs[k], errors[k]);
-    for (size_t i = 0; i < bias.size(); ++i)
-      out.squaredBias[i] += static_cast<float>(squaredShare(weights, k, i)) * bias[i];
+    addVariance(out.noise, weights, k, meanVariance(*inputs[k]));
+    addSquaredBias(out.squaredBias, weights, k, squaredBiasSamples(*inputs[k]));
+    addSquaredBias(claimed, weights, k, squaredBiases[k - 1]);
   }
+  out.image.variance = out.noise;
+  for (Plane<float>& plane : out.image.variance.channel)
+    for (size_t i = 0; i < claimed.size(); ++i) plane[i] += claimed[i];
   return out;
 }
 

@@ -19,6 +19,10 @@ constexpr double kSignificance = 3;
 
 double at(const Rgb<float>& image, size_t i, size_t c) { return static_cast<double>(image[c][i]); }
 
+double biasVarianceAt(const Estimate& e, size_t i, size_t c) {
+  return e.biasVariance.empty() ? 0.0 : at(e.biasVariance, i, c);
+}
+
 // error := max(error, scale (m² + offset)), m the channel mean of the image.
 void raise(Plane<float>& error, const Rgb<float>& image, double scale, double offset) {
   parallelChunks(error.size(), kPixelChunk, [&](size_t begin, size_t end) {
@@ -77,36 +81,45 @@ Plane<float> unbiasedError(const Estimate& unbiased, const Rgb<float>& variance)
   return error;
 }
 
+Plane<float> squaredBiasSamples(const Estimate& photonMap) {
+  return channelMean(photonMap.mean.width(), photonMap.mean.height(), [&](size_t i, size_t c) {
+    return sqr(at(photonMap.bias, i, c)) - biasVarianceAt(photonMap, i, c);
+  });
+}
+
+PhotonMapError photonMapError(const Estimate& photonMap, const Features* features) {
+  const Rgb<float> noise = meanVariance(photonMap);
+  const Plane<float> spread = channelMean(noise, [&](size_t i, size_t c) { return at(noise, i, c); });
+  const Plane<float> squaredBias = squaredBiasSamples(photonMap);
+  std::vector<Plane<float>> smooth = jointFilter({&spread, &squaredBias}, features, kRadius);
+  PhotonMapError error{std::move(smooth[0]), std::move(smooth[1])};
+  for (size_t i = 0; i < noise.size(); ++i) {
+    double deviation = 0;
+    for (size_t c = 0; c < 3; ++c) deviation += biasVarianceAt(photonMap, i, c) / 3;
+    const double own = static_cast<double>(squaredBias[i]);
+    const bool significant = own + deviation > sqr(kSignificance) * deviation;
+    error.squaredBias[i] = std::max({0.0f, error.squaredBias[i], significant ? finiteFloat(own) : 0.0f});
+  }
+  return error;
+}
+
+Plane<float> totalError(const Estimate& photonMap, const PhotonMapError& error) {
+  Plane<float> sum = error.variance;
+  for (size_t i = 0; i < sum.size(); ++i) sum[i] += error.squaredBias[i];
+  raise(sum, photonMap.mean, 1e-8, 1e-4);
+  return sum;
+}
+
 Plane<float> biasedError(const Estimate& biased, const Estimate& unbiased, const Rgb<float>& variance,
                          const Features* features) {
-  Plane<float> error;
-  if (!biased.bias.empty()) {
-    const Rgb<float> noise = meanVariance(biased);
-    const Plane<float> spread = channelMean(noise, [&](size_t i, size_t c) { return at(noise, i, c); });
-    const Plane<float> squaredBias = channelMean(noise, [&](size_t i, size_t c) {
-      const double spare = biased.biasVariance.empty() ? 0.0 : at(biased.biasVariance, i, c);
-      return at(biased.bias, i, c) * at(biased.bias, i, c) - spare;
-    });
-    const std::vector<Plane<float>> smooth = jointFilter({&spread, &squaredBias}, features, kRadius);
-    error = smooth[0];
-    for (size_t i = 0; i < error.size(); ++i) {
-      double spare = 0, square = 0;
-      for (size_t c = 0; c < 3; ++c) {
-        if (!biased.biasVariance.empty()) spare += at(biased.biasVariance, i, c) / 3;
-        square += at(biased.bias, i, c) * at(biased.bias, i, c) / 3;
-      }
-      const float own = square > kSignificance * kSignificance * spare ? finiteFloat(square - spare) : 0.0f;
-      error[i] += std::max({0.0f, smooth[1][i], own});
-    }
-  } else {
-    const Plane<float> samples = hasHalves(biased) && hasHalves(unbiased)
-                                     ? squaredErrorSamples(biased.half, unbiased, variance)
-                                     : channelMean(variance, [&](size_t i, size_t c) {
-                                         const double d = at(biased.mean, i, c) - at(unbiased.mean, i, c);
-                                         return d * d - at(variance, i, c);
-                                       });
-    error = std::move(jointFilter({&samples}, features, kRadius)[0]);
-  }
+  if (!biased.bias.empty()) return totalError(biased, photonMapError(biased, features));
+  const Plane<float> samples = hasHalves(biased) && hasHalves(unbiased)
+                                   ? squaredErrorSamples(biased.half, unbiased, variance)
+                                   : channelMean(variance, [&](size_t i, size_t c) {
+                                       const double d = at(biased.mean, i, c) - at(unbiased.mean, i, c);
+                                       return d * d - at(variance, i, c);
+                                     });
+  Plane<float> error = std::move(jointFilter({&samples}, features, kRadius)[0]);
   raise(error, biased.mean, 1e-8, 1e-4);
   return error;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <random>
 
 #include <doctest/doctest.h>
 
@@ -182,6 +183,68 @@ TEST_CASE("Fused weights are inverse errors, and the bias that is left is counte
   CHECK(f.image.quarter[2][1][500] == doctest::Approx(0.925).epsilon(1e-3));
   CHECK(f.image.variance[0][500] == doctest::Approx(0.0625 * 0.03 + 0.5625 * 0.01).epsilon(1e-3));
   CHECK(f.squaredBias[500] == doctest::Approx(0.5625 * 0.005).epsilon(1e-3));
+}
+
+TEST_CASE("An outlier that both images hold makes no noise of the pixels around it") {
+  // Its smoothed variances decide the weights of the whole window; the noise of a pixel stays its own.
+  Estimate x = flat(1.0f, 1e-3f), s = flat(1.0f, 3e-3f);
+  s.bias = s.biasVariance = Rgb<float>(40, 30);
+  const size_t outlier = x.mean[0].index(20, 15);
+  for (Estimate* e : {&x, &s}) setPixel(*e, outlier, 226, {1, 901, 1, 1}, 5e4f);
+  const FusedEstimate f = fusedEstimate(x, {&s}, nullptr);
+  CHECK(f.noise[0][outlier] > 1e4f);
+  for (const size_t beside : {outlier + 1, outlier - 3, outlier + 3 * 40}) {
+    // Weights of about 1/2 each, for the outlier's errors are alike.
+    CHECK(f.noise[1][beside] == doctest::Approx(0.25 * 1e-3 + 0.25 * 3e-3).epsilon(0.01));
+    CHECK(f.image.variance[1][beside] == f.noise[1][beside]);
+  }
+}
+
+TEST_CASE("A photon map without bias leaves none in the error, however noisy its estimate of it is") {
+  const int width = 120, height = 90;
+  Estimate x = flat(1.0f, 1e-3f, width, height), s = flat(1.0f, 1e-3f, width, height);
+  std::mt19937 random(1);
+  std::normal_distribution<float> normal(0, 0.05f);
+  s.bias = Rgb<float>(width, height);
+  s.biasVariance = Rgb<float>(width, height, sqr(0.05f));
+  for (Plane<float>& plane : s.bias.channel)
+    for (float& b : plane.data) b = normal(random);
+  const FusedEstimate f = fusedEstimate(x, {&s}, nullptr);
+  const double pixels = width * height;
+  double mean = 0, square = 0, claimed = 0;
+  for (size_t i = 0; i < f.squaredBias.size(); ++i) {
+    const auto sample = static_cast<double>(f.squaredBias[i]);
+    mean += sample / pixels;
+    square += sample * sample / pixels;
+    claimed += static_cast<double>(f.image.variance[0][i] - f.noise[0][i]) / pixels;
+  }
+  CHECK(std::fabs(mean) < 4 * std::sqrt(square / pixels));  // one false alarm in 16,000 seeds
+  CHECK(claimed > 0);                                       // weights and filters count on the worst
+  CHECK(relativeSum(smoothedSquaredBias(f.squaredBias, x.mean), x.mean) < 0.1 * sqr(0.05));
+  // A bias, on the other hand, is found.
+  for (Plane<float>& plane : s.bias.channel)
+    for (float& b : plane.data) b += 0.2f;
+  const FusedEstimate biased = fusedEstimate(x, {&s}, nullptr);
+  const double share = 1 - (0.001 + 0.04) / (0.001 + 0.001 + 0.04);  // of the photon map, by inverse errors
+  CHECK(relativeSum(smoothedSquaredBias(biased.squaredBias, x.mean), x.mean) ==
+        doctest::Approx(sqr(share) * 0.04 / 1.01).epsilon(0.1));
+}
+
+TEST_CASE(
+    "Squared errors that halves show are those of half the samples: less of them is the image's where it follows") {
+  // Halves of x deviate by +-s, so that v = s² / 2; both halves of the image are off by b.
+  const double s = 0.1, b = 0.05, v = s * s / 2;
+  Estimate x = flat(1.0f, static_cast<float>(v));
+  x.half[0] = Rgb<float>(40, 30, static_cast<float>(1 + s));
+  x.half[1] = Rgb<float>(40, 30, static_cast<float>(1 - s));
+  const Rgb<float> halves[2] = {Rgb<float>(40, 30, static_cast<float>(1 + b)),
+                                Rgb<float>(40, 30, static_cast<float>(1 + b))};
+  const double unit = 1.01, measured = unit * b * b / (unit + v);
+  CHECK(errorMap(halves, x, x.variance, x.mean)[500] == doctest::Approx(measured).epsilon(1e-3));
+  CHECK(errorMap(halves, x, x.variance, x.mean, true)[500] ==
+        doctest::Approx(measured * 2 * v / (2 * v + b * b)).epsilon(1e-3));
+  const Estimate exact = flat(1.0f, 0.0f);
+  CHECK(errorMap(exact.half, exact, exact.variance, exact.mean, true)[500] == 0);
 }
 
 TEST_CASE("Where the unbiased image has not found the light, the photon map is believed") {
