@@ -84,10 +84,13 @@ MemoryPlan planMemory(const Scene& scene, const Plan& plan, const Recipe& recipe
                   {"hierarchies", scene.accel().bytes()},
                   {"geometry", scene.geometryBytes()},
                   {"textures", scene.textureBytes()}};
+  const uint64_t always = memory.total();
   for (const PlannedIntegrator& p : plan.integrators)
     memory.items.push_back({std::string(p.integrator->name()) + " passes", p.integrator->workingMemory(plan).bytes});
-  const uint64_t always = memory.total();
-  memory.combinedOnce = always + copy.bytes + std::max(film.bytes + writing.bytes, combining.bytes);
+  const uint64_t passes = memory.total() - always;
+  // At the end the passes are over, and the film is given back before its copy is combined.
+  memory.combinedOnce =
+      always + std::max(film.bytes + std::max(passes, copy.bytes + writing.bytes), copy.bytes + combining.bytes);
   memory.items.push_back(film);
   memory.items.push_back(copy);
   memory.items.push_back(combining.bytes > writing.bytes ? combining : writing);

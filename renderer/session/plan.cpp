@@ -31,9 +31,10 @@ void planIntegrators(const Scene& scene, const Settings& settings, const std::ve
       const bool planned = std::any_of(plan.integrators.begin(), plan.integrators.end(),
                                        [&](const PlannedIntegrator& p) { return p.integrator == i; });
       if (planned) continue;
-      const Applies applies = i->applies(scene.traits(), reach);
-      // An integrator asked for by name runs even where the scene does not need it.
-      const bool kept = applies.yes || name != "auto" || settings.full;
+      // An integrator asked for by name runs even where the scene does not need it; how light reaches what is in view
+      // is not measured for it.
+      const Applies applies = name == "auto" ? i->applies(scene.traits(), reach) : Applies{true, "as --integrator says"};
+      const bool kept = applies.yes || settings.full;
       plan.lines.push_back({kept, i->name(), applies.reason});
       if (kept) plan.integrators.push_back({i, 1});
     }
