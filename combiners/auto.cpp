@@ -2,10 +2,10 @@
 // "auto": the best image that the inputs allow, without a choice for the user. The rule and its reasons are in
 // combiners/auto.md; its steps are
 //   1. x: the unbiased image, fused with photon maps by their estimated errors (fused_estimate.h);
-//   2. bases: patch-Welch filters of x, and the denoisers that the user asked for;
-//   3. candidates: every base, and x shrunk towards it (shrinkage.h);
-//   4. an ensemble of the candidates, with errors measured across halves (relative_weights.h);
-//   5. outliers that one or two quarters alone speak for are replaced (despike.h);
+//   2. outliers of x that one or two quarters alone speak for are replaced (despike.h);
+//   3. bases: patch-Welch filters of x, and the denoisers that the user asked for;
+//   4. candidates: every base, and x shrunk towards it (shrinkage.h);
+//   5. an ensemble of the candidates, with errors measured across halves (relative_weights.h);
 //   6. the error map (error_map.h), plus the squared bias that the photon maps admit.
 // x itself is no candidate: halves cannot see the error of an outlier in the half that holds it.
 #include <algorithm>
@@ -61,11 +61,14 @@ Estimate asEstimate(std::vector<Rgb<float>> images, const char* name) {
 }
 
 MethodMemory Auto::memory(const MemoryCase& of) const {
-  const int fused = of.photonMaps > 0 ? 102 : 0, others = of.bases - of.photonMaps;
+  const int fused = of.photonMaps > 0 ? 110 : 0, others = of.bases - of.photonMaps;
   if (of.passes > 0 && of.passes < kFewestPasses) return {96 + fused + 36 * others, 36};
   const int bases = others + (of.passes > 0 && of.passes < kFirstOrderPasses ? 2 : 3);
-  return {114 + 80 * bases + fused, 40 + 8 * bases};
+  return {124 + 80 * bases + fused, 40 + 8 * bases};
 }
+
+// Whether errors can be measured across halves. Images of other renderers may not tell their passes.
+bool mayBeMeasured(const Estimate& x) { return x.passes == 0 || x.passes >= kFewestPasses; }
 
 // The filters of x, fewer once cancelled: a wide one, from 64 passes on its first-order fit, and last a careful one
 // that takes no neighbour's noise for its own.
@@ -75,7 +78,7 @@ std::vector<Estimate> filtersOf(const Estimate& x, const Features* features, con
   if (cancelled()) return bases;
   const PatchWelchInput input = patchWelchInput(x, features);
   if (input.variance.empty()) return bases;
-  if (x.passes > 0 && x.passes < kFewestPasses) {
+  if (!mayBeMeasured(x)) {
     bases.push_back(asEstimate(std::move(patchWelch(input, std::array{kPatchWelchThreshold}, {}, cancel)[0]), "pw"));
     return bases;
   }
@@ -146,11 +149,21 @@ Attribute countRemark(const char* name, size_t count) {
   return a;
 }
 
-void removeSpikes(MethodResult& result, const Estimate& x, const Rgb<float>& variance, const Features* features) {
-  const std::vector<Spike> spikes = findSpikes(result.image.mean, x, variance, features);
-  replaceSpikes(result.image.mean, spikes);
-  for (Rgb<float>& half : result.image.half) replaceSpikes(half, spikes);
-  result.remarks.push_back(countRemark("replacedOutliers", spikes.size()));
+// What is read of x from here on, without its outliers.
+Estimate withoutSpikes(const Estimate& x, const Rgb<float>& variance, const std::vector<Spike>& spikes) {
+  Estimate out;
+  out.name = x.name;
+  out.correlation = x.correlation;
+  out.passes = x.passes;
+  out.mean = x.mean;
+  replaceValues(out.mean, spikes);
+  for (size_t h = 0; h < 2; ++h) {
+    out.half[h] = x.half[h];
+    replaceValues(out.half[h], spikes);
+  }
+  out.variance = variance;
+  replaceVariances(out.variance, spikes);
+  return out;
 }
 
 void addTo(Plane<float>& sum, const Plane<float>& other) {
@@ -164,13 +177,22 @@ MethodResult Auto::run(const MethodInputs& in) const {
     (!b->bias.empty() && in.options.number(kFuse) != 0 ? photonMaps : others).push_back(b);
   FusedEstimate fused;
   if (!photonMaps.empty()) fused = fusedEstimate(*in.unbiased, photonMaps, in.features);
-  const Estimate& x = photonMaps.empty() ? *in.unbiased : fused.image;
+  const Estimate& whole = photonMaps.empty() ? *in.unbiased : fused.image;
+  Estimate clean;
+  if (in.options.number(kDespike) != 0 && mayBeMeasured(whole)) {
+    const Rgb<float> variance = meanVariance(whole);
+    const std::vector<Spike> spikes = findSpikes(whole, variance, in.features);
+    result.remarks.push_back(countRemark("replacedOutliers", spikes.size()));
+    if (!spikes.empty()) clean = withoutSpikes(whole, variance, spikes);
+    if (!fused.noise.empty()) replaceVariances(fused.noise, spikes);
+  }
+  const Estimate& x = clean.mean.empty() ? whole : clean;
   std::vector<Estimate> bases;
   for (const Estimate* b : others) bases.push_back(consistentHalves(baseOf(*b, x, !photonMaps.empty(), in)));
   for (Estimate& e : filtersOf(x, in.features, in.cancel)) bases.push_back(std::move(e));
   const auto cancelled = [&] { return in.cancel && in.cancel->load(); };
   if (cancelled()) return result;
-  if (bases.empty() || (x.passes > 0 && x.passes < kFewestPasses)) {  // nothing can be measured across halves
+  if (bases.empty() || !mayBeMeasured(x)) {
     result.image = bases.empty() ? x : std::move(bases.back());
     return result;
   }
@@ -185,7 +207,6 @@ MethodResult Auto::run(const MethodInputs& in) const {
   const WeightMaps weights = relativeWeights(x, candidates, bases.back().mean, variance, in.features, patchRadius);
   if (cancelled()) return result;
   result.image = weightedEstimate(weights, candidates);
-  if (in.options.number(kDespike) != 0) removeSpikes(result, x, variance, in.features);
   result.error = errorMap(result.image.half, x, fused.noise.empty() ? variance : fused.noise, result.image.mean, true);
   if (!fused.squaredBias.empty()) addTo(result.error, smoothedSquaredBias(fused.squaredBias, result.image.mean));
   std::vector<Plane<float>> maps = channelMeans(weights);

@@ -52,11 +52,11 @@ double darkHalf(const Estimate& unbiased, size_t i) {
 
 struct Neighbours {
   double weight = 0, brightest = 0;
-  double mean[3] = {0, 0, 0};
+  std::array<double, 3> mean{}, variance{};
 };
 
-Neighbours neighboursOf(const Rgb<float>& image, const std::vector<char>& candidate, const Features* features, int x,
-                        int y) {
+Neighbours neighboursOf(const Rgb<float>& image, const Rgb<float>& variance, const std::vector<char>& candidate,
+                        const Features* features, int x, int y) {
   Neighbours n;
   const size_t at = image[0].index(x, y);
   for (int v = std::max(0, y - kNeighbourRadius); v <= std::min(image.height() - 1, y + kNeighbourRadius); ++v)
@@ -71,39 +71,54 @@ Neighbours neighboursOf(const Rgb<float>& image, const std::vector<char>& candid
       const double distance = static_cast<double>((u - x) * (u - x) + (v - y) * (v - y));
       const double w = std::exp(-unlike - distance / 8);
       n.weight += w;
-      for (size_t c = 0; c < 3; ++c) n.mean[c] += w * static_cast<double>(image[c][other]);
+      for (size_t c = 0; c < 3; ++c) {
+        n.mean[c] += w * static_cast<double>(image[c][other]);
+        n.variance[c] += w * static_cast<double>(variance[c][other]);
+      }
     }
+  for (size_t c = 0; c < 3 && n.weight > 0; ++c) {
+    n.mean[c] /= n.weight;
+    n.variance[c] /= n.weight;
+  }
   return n;
 }
 
 }  // namespace
 
-std::vector<Spike> findSpikes(const Rgb<float>& image, const Estimate& unbiased, const Rgb<float>& variance,
-                              const Features* features) {
+std::vector<Spike> findSpikes(const Estimate& unbiased, const Rgb<float>& variance, const Features* features) {
   std::vector<Spike> spikes;
   if (unbiased.quarter.size() != 4) return spikes;
+  const Rgb<float>& image = unbiased.mean;
   const std::vector<char> candidate = candidates(variance);
   for (int y = 0; y < image.height(); ++y)
     for (int x = 0; x < image.width(); ++x) {
       const size_t i = image[0].index(x, y);
       if (!candidate[i]) continue;
-      const Neighbours n = neighboursOf(image, candidate, features, x, y);
+      const Neighbours n = neighboursOf(image, variance, candidate, features, x, y);
       const double value = brightness(image, i);
       if (n.weight < 1e-6 || value <= n.brightest) continue;
-      const double mean = (n.mean[0] + n.mean[1] + n.mean[2]) / (3 * n.weight);
+      const double mean = (n.mean[0] + n.mean[1] + n.mean[2]) / 3;
       // On the rim of a lamp no neighbour is of the same surface, and the others may be brighter.
       if (value <= mean) continue;
       if (darkHalf(unbiased, i) - mean >= kQuarterShare * (value - mean)) continue;
-      Spectrum replacement{0};
-      for (size_t c = 0; c < 3; ++c) replacement[static_cast<int>(c)] = finiteFloat(n.mean[c] / n.weight);
-      spikes.push_back({i, replacement});
+      Spike spike{i};
+      for (int c = 0; c < 3; ++c) {
+        spike.value[c] = finiteFloat(n.mean[static_cast<size_t>(c)]);
+        spike.variance[c] = finiteFloat(n.variance[static_cast<size_t>(c)]);
+      }
+      spikes.push_back(spike);
     }
   return spikes;
 }
 
-void replaceSpikes(Rgb<float>& image, const std::vector<Spike>& spikes) {
+void replaceValues(Rgb<float>& image, const std::vector<Spike>& spikes) {
   for (const Spike& s : spikes)
-    for (size_t c = 0; c < 3; ++c) image[c][s.index] = s.replacement[static_cast<int>(c)];
+    for (size_t c = 0; c < 3; ++c) image[c][s.index] = s.value[static_cast<int>(c)];
+}
+
+void replaceVariances(Rgb<float>& variance, const std::vector<Spike>& spikes) {
+  for (const Spike& s : spikes)
+    for (size_t c = 0; c < 3; ++c) variance[c][s.index] = s.variance[static_cast<int>(c)];
 }
 
 }  // namespace braid

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Removes outliers that have gone through a combination, where one sample, and nothing else, speaks for them.
+// Removes outliers of an unbiased estimate: pixels where one sample, and nothing else, speaks for what they show.
 #pragma once
 
 #include <cstdint>
@@ -12,23 +12,23 @@ namespace braid {
 // A pixel that is replaced, and by what.
 struct Spike {
   size_t index = 0;
-  Spectrum replacement{0};
+  Spectrum value{0}, variance{0};
 };
 
-// The spikes of `image` (ALGORITHMS-BEYOND 8.3, step 6). A pixel is one if
-//   - the standard deviation of the unbiased mean, sqrt(mean_RGB v), is above 8 times its mean over 15x15 pixels;
-//   - the image is brighter there than all of its 5x5 neighbours that are no candidates and lie on the same surface,
-//   and
-//     than the mean that would replace it;
-//   - the two darkest quarters of the unbiased estimate show less than 0.3 of the excess over the neighbours' mean:
-//     an outlier lives in one or two quarters, a thin lamp in all four.
-// The replacement is the mean of those neighbours, weighted by nearness and by likeness in albedo and normal. The third
-// condition makes it vanish as samples grow: what is there shows in every quarter. Needs the four quarters of the
-// unbiased estimate; without them there are no spikes.
-std::vector<Spike> findSpikes(const Rgb<float>& image, const Estimate& unbiased, const Rgb<float>& variance,
-                              const Features* features);
+// The spikes of an estimate (ALGORITHMS-BEYOND 8.3, step 6, looks for them in what has been combined; by then filters
+// have spread them over their neighbours). A pixel is one if
+//   - its standard deviation, sqrt(mean_RGB v), is above 8 times the mean of these over 15x15 pixels;
+//   - it is brighter than all of its 5x5 neighbours that are no candidates and lie on the same surface, and than the
+//     mean that would replace it;
+//   - its two darkest quarters show less than 0.3 of the excess over the neighbours' mean: an outlier lives in one or
+//     two quarters, a thin lamp in all four.
+// Value and variance are replaced by the means of those neighbours, weighted by nearness and by likeness in albedo and
+// normal. The third condition makes spikes vanish as samples grow: what is there shows in every quarter. Needs the four
+// quarters; without them there are no spikes. `variance` is that of the mean.
+std::vector<Spike> findSpikes(const Estimate& unbiased, const Rgb<float>& variance, const Features* features);
 
-// Writes the replacements into an image.
-void replaceSpikes(Rgb<float>& image, const std::vector<Spike>& spikes);
+// Writes the replacements into an image or into a variance.
+void replaceValues(Rgb<float>& image, const std::vector<Spike>& spikes);
+void replaceVariances(Rgb<float>& variance, const std::vector<Spike>& spikes);
 
 }  // namespace braid

@@ -35,7 +35,7 @@ std::string mebibytes(uint64_t bytes) {
 
 // OpenEXR holds a few copies of the rows that it compresses.
 uint64_t writingBytes(const Plan& plan, const Facts& facts) {
-  constexpr uint64_t kRows = 64, kCopies = 5, kHeadline = 12;
+  constexpr uint64_t kRows = 128, kCopies = 3, kHeadline = 12;
   return kRows * kCopies * static_cast<uint64_t>(plan.window.width()) *
          (static_cast<uint64_t>(estimatesMemory(facts)) + kHeadline);
 }
@@ -88,9 +88,9 @@ MemoryPlan planMemory(const Scene& scene, const Plan& plan, const Recipe& recipe
   for (const PlannedIntegrator& p : plan.integrators)
     memory.items.push_back({std::string(p.integrator->name()) + " passes", p.integrator->workingMemory(plan).bytes});
   const uint64_t passes = memory.total() - always;
-  // At the end the passes are over, and the film is given back before its copy is combined.
+  // At the end the passes are over, and the film is given back before its copy is combined and written.
   memory.combinedOnce =
-      always + std::max(film.bytes + std::max(passes, copy.bytes + writing.bytes), copy.bytes + combining.bytes);
+      always + std::max(film.bytes + passes, copy.bytes + std::max({film.bytes, combining.bytes, writing.bytes}));
   memory.items.push_back(film);
   memory.items.push_back(copy);
   memory.items.push_back(combining.bytes > writing.bytes ? combining : writing);

@@ -24,7 +24,7 @@ namespace {
 
 constexpr float kHalfMax = 65504;
 // Rows written at once: several ZIP blocks of 16 rows, so that OpenEXR compresses them in parallel.
-constexpr int kRowsPerWrite = 64;
+constexpr int kRowsPerWrite = 128;
 
 using Names = std::array<const char*, 3>;
 constexpr Names kColour = {"R", "G", "B"};
