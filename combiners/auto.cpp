@@ -63,15 +63,15 @@ Estimate asEstimate(std::vector<Rgb<float>> images, const char* name) {
 MethodMemory Auto::memory(const MemoryCase& of) const {
   const int fused = of.photonMaps > 0 ? 110 : 0, others = of.bases - of.photonMaps;
   if (of.passes > 0 && of.passes < kFewestPasses) return {96 + fused + 36 * others, 36};
-  const int bases = others + (of.passes > 0 && of.passes < kFirstOrderPasses ? 2 : 3);
+  const int bases = others + 2;
   return {124 + 80 * bases + fused, 40 + 8 * bases};
 }
 
 // Whether errors can be measured across halves. Images of other renderers may not tell their passes.
 bool mayBeMeasured(const Estimate& x) { return x.passes == 0 || x.passes >= kFewestPasses; }
 
-// The filters of x, fewer once cancelled: a wide one, from 64 passes on its first-order fit, and last a careful one
-// that takes no neighbour's noise for its own.
+// The filters of x, fewer once cancelled: a wide one, from 64 passes on its first-order fit instead, and last a careful
+// one that takes no neighbour's noise for its own.
 std::vector<Estimate> filtersOf(const Estimate& x, const Features* features, const std::atomic<bool>* cancel) {
   const auto cancelled = [&] { return cancel && cancel->load(); };
   std::vector<Estimate> bases;
@@ -84,9 +84,9 @@ std::vector<Estimate> filtersOf(const Estimate& x, const Features* features, con
   }
   auto wide = patchWelch(input, std::array{kPatchWelchWideThreshold}, {}, cancel);
   if (cancelled()) return bases;
-  if (x.passes >= kFirstOrderPasses)
-    bases.push_back(asEstimate(patchWelchFirstOrder(input, wide[0], {}, cancel), "pw1"));
-  bases.push_back(asEstimate(std::move(wide[0]), "pw-wide"));
+  const bool firstOrder = x.passes >= kFirstOrderPasses;
+  bases.push_back(firstOrder ? asEstimate(patchWelchFirstOrder(input, wide[0], {}, cancel), "pw1")
+                             : asEstimate(std::move(wide[0]), "pw-wide"));
   if (cancelled()) return bases;
   const PatchWelchInput robust = patchWelchInput(x, features, true);
   auto careful = patchWelch(robust, std::array{kPatchWelchThreshold}, {}, cancel);
