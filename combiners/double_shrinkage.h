@@ -29,7 +29,8 @@ Plane<float> squaredBiasSamples(const Estimate& photonMap);
 // What the squared error of an image that estimates its own bias (a photon map; ALGORITHMS 6.2) is made of: its
 // variance and gamma², the square of its bias less the variance of that estimate, not below 0. Averaged over channels
 // and smoothed over 13 x 13 pixels along surfaces, for bias has structure; where a pixel's own bias is beyond three
-// deviations, gamma² is no less than it says.
+// deviations, gamma² is no less than it says. Variances beyond 64 times what is usual around them stay with their
+// pixels: an outlier would take a whole window from the photon map, and with it the caustic in it.
 struct PhotonMapError {
   Plane<float> variance, squaredBias;
 };

@@ -8,6 +8,7 @@
 #include "combiners/channel_mean.h"
 #include "combiners/finite_float.h"
 #include "combiners/joint_filter.h"
+#include "combiners/shrinkage.h"
 
 namespace braid {
 
@@ -16,6 +17,7 @@ namespace {
 constexpr int kRadius = 6;
 constexpr double kWinsorise = 8;
 constexpr double kSignificance = 3;
+constexpr double kOutlier = 64;
 
 double at(const Rgb<float>& image, size_t i, size_t c) { return static_cast<double>(image[c][i]); }
 
@@ -62,6 +64,14 @@ Plane<double> trimmedMean(const Plane<float>& in) {
   return out;
 }
 
+// Variances of at most 64 times what is usual around them.
+Plane<float> withoutOutliers(const Plane<float>& variance) {
+  const Plane<double> usual = usualVariance(variance);
+  Plane<float> out = variance;
+  for (size_t i = 0; i < out.size(); ++i) out[i] = std::min(out[i], finiteFloat(kOutlier * usual[i]));
+  return out;
+}
+
 }  // namespace
 
 DoubleShrinkage doubleShrinkage(double unbiasedError, double biasedError, double priorError) {
@@ -91,9 +101,11 @@ PhotonMapError photonMapError(const Estimate& photonMap, const Features* feature
   const Rgb<float> noise = meanVariance(photonMap);
   const Plane<float> spread = channelMean(noise, [&](size_t i, size_t c) { return at(noise, i, c); });
   const Plane<float> squaredBias = squaredBiasSamples(photonMap);
-  std::vector<Plane<float>> smooth = jointFilter({&spread, &squaredBias}, features, kRadius);
+  const Plane<float> limited = withoutOutliers(spread);
+  std::vector<Plane<float>> smooth = jointFilter({&limited, &squaredBias}, features, kRadius);
   PhotonMapError error{std::move(smooth[0]), std::move(smooth[1])};
   for (size_t i = 0; i < noise.size(); ++i) {
+    if (limited[i] < spread[i]) error.variance[i] = spread[i];
     double deviation = 0;
     for (size_t c = 0; c < 3; ++c) deviation += biasVarianceAt(photonMap, i, c) / 3;
     const double own = static_cast<double>(squaredBias[i]);

@@ -263,6 +263,18 @@ TEST_CASE("Where the unbiased image has not found the light, the photon map is b
   CHECK(fusedEstimate(x, {&s}, nullptr).image.mean[0].at(5, 15) > 1.49f);
 }
 
+TEST_CASE("An outlier of the photon map does not take the caustic around it") {
+  Estimate x = flat(0.1f, 1e-6f), s = flat(0.5f, 1e-3f);
+  s.unbiased = false;
+  s.bias = s.biasVariance = Rgb<float>(40, 30);
+  const size_t outlier = s.mean[0].index(20, 15);
+  setPixel(s, outlier, 200, {797, 1, 1, 1}, 4e4f);
+  const FusedEstimate f = fusedEstimate(x, {&s}, nullptr);
+  for (const size_t beside : {outlier + 1, outlier - 2 * 40, outlier + 6 * 40 - 6})
+    CHECK(f.image.mean[1][beside] == doctest::Approx(0.5).epsilon(0.05));
+  CHECK(f.image.mean[1][outlier] < 1);  // its own pixel it does take
+}
+
 TEST_CASE("An outlier in one quarter is replaced, a lamp in all of them stays") {
   Estimate x = flat(1.0f, 1e-4f);
   const size_t outlier = x.mean[0].index(10, 10), lamp = x.mean[0].index(30, 20);
