@@ -15,6 +15,7 @@
 #include "combiners/denoise/pw_filter.h"
 #include "combiners/despike.h"
 #include "combiners/error_map.h"
+#include "combiners/finite_float.h"
 #include "combiners/fused_estimate.h"
 #include "combiners/recipe.h"
 #include "combiners/registry.h"
@@ -167,7 +168,8 @@ Estimate withoutSpikes(const Estimate& x, const Rgb<float>& variance, const std:
 }
 
 void addTo(Plane<float>& sum, const Plane<float>& other) {
-  for (size_t i = 0; i < sum.size(); ++i) sum[i] += other[i];
+  for (size_t i = 0; i < sum.size(); ++i)
+    sum[i] = finiteFloat(static_cast<double>(sum[i]) + static_cast<double>(other[i]));
 }
 
 MethodResult Auto::run(const MethodInputs& in) const {

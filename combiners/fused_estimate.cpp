@@ -114,7 +114,8 @@ FusedEstimate fusedEstimate(const Estimate& unbiased, const std::vector<const Es
   }
   out.image.variance = out.noise;
   for (Plane<float>& plane : out.image.variance.channel)
-    for (size_t i = 0; i < claimed.size(); ++i) plane[i] += claimed[i];
+    for (size_t i = 0; i < claimed.size(); ++i)
+      plane[i] = finiteFloat(static_cast<double>(plane[i]) + static_cast<double>(claimed[i]));
   return out;
 }
 

@@ -117,7 +117,8 @@ PhotonMapError photonMapError(const Estimate& photonMap, const Features* feature
 
 Plane<float> totalError(const Estimate& photonMap, const PhotonMapError& error) {
   Plane<float> sum = error.variance;
-  for (size_t i = 0; i < sum.size(); ++i) sum[i] += error.squaredBias[i];
+  for (size_t i = 0; i < sum.size(); ++i)
+    sum[i] = finiteFloat(static_cast<double>(sum[i]) + static_cast<double>(error.squaredBias[i]));
   raise(sum, photonMap.mean, 1e-8, 1e-4);
   return sum;
 }
