@@ -186,9 +186,11 @@ TEST_CASE("The preset fills in what was not given, and every method of it can ru
   const std::string summary{std::istreambuf_iterator<char>(in), {}};
   CHECK(summary.find("### Ensemble denoising") != std::string::npos);
   CHECK(summary.find("| cornell | uncorrelated | 2 |") != std::string::npos);
-  // Only what needs photon maps has nothing to measure in a box without glass.
+  // Only what needs photon maps has nothing to measure in a box without glass. At equal time it depends on milliseconds
+  // whether the methods' times overlap.
   size_t unmeasured = 0;
-  for (size_t at = summary.find("not measured"); at != std::string::npos; at = summary.find("not measured", at + 1))
-    ++unmeasured;
-  CHECK(unmeasured == 5);
+  std::istringstream lines(summary);
+  for (std::string line; std::getline(lines, line);)
+    unmeasured += line.find("not measured") != std::string::npos && line.find("at equal time") == std::string::npos;
+  CHECK(unmeasured == 2);
 }
