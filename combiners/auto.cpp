@@ -150,20 +150,16 @@ Attribute countRemark(const char* name, size_t count) {
   return a;
 }
 
-// What is read of x from here on, without its outliers.
-Estimate withoutSpikes(const Estimate& x, const Rgb<float>& variance, const std::vector<Spike>& spikes) {
+// What is read of x from here on, with the replacements; `variance` holds them already.
+Estimate withReplacements(const Estimate& x, const Rgb<float>& variance, const std::vector<Spike>& spikes) {
   Estimate out;
   out.name = x.name;
   out.correlation = x.correlation;
   out.passes = x.passes;
   out.mean = x.mean;
-  replaceValues(out.mean, spikes);
-  for (size_t h = 0; h < 2; ++h) {
-    out.half[h] = x.half[h];
-    replaceValues(out.half[h], spikes);
-  }
+  for (size_t h = 0; h < 2; ++h) out.half[h] = x.half[h];
+  for (Rgb<float>* image : {&out.mean, &out.half[0], &out.half[1]}) replaceValues(*image, spikes);
   out.variance = variance;
-  replaceVariances(out.variance, spikes);
   return out;
 }
 
@@ -180,13 +176,15 @@ MethodResult Auto::run(const MethodInputs& in) const {
   FusedEstimate fused;
   if (!photonMaps.empty()) fused = fusedEstimate(*in.unbiased, photonMaps, in.features);
   const Estimate& whole = photonMaps.empty() ? *in.unbiased : fused.image;
+  Rgb<float> variance;
+  if (mayBeMeasured(whole)) variance = meanVariance(whole);
   Estimate clean;
   if (in.options.number(kDespike) != 0 && mayBeMeasured(whole)) {
-    const Rgb<float> variance = meanVariance(whole);
     const std::vector<Spike> spikes = findSpikes(whole, variance, in.features);
     result.remarks.push_back(countRemark("replacedOutliers", spikes.size()));
-    if (!spikes.empty()) clean = withoutSpikes(whole, variance, spikes);
+    replaceVariances(variance, spikes);
     if (!fused.noise.empty()) replaceVariances(fused.noise, spikes);
+    if (!spikes.empty()) clean = withReplacements(whole, variance, spikes);
   }
   const Estimate& x = clean.mean.empty() ? whole : clean;
   std::vector<Estimate> bases;
@@ -198,7 +196,6 @@ MethodResult Auto::run(const MethodInputs& in) const {
     result.image = bases.empty() ? x : std::move(bases.back());
     return result;
   }
-  const Rgb<float> variance = meanVariance(x);
   std::vector<Estimate> shrunk;
   if (in.options.number(kShrink) != 0) shrunk = shrunkTowards(bases, x, variance, in.cancel);
   if (cancelled()) return result;

@@ -293,7 +293,7 @@ TEST_CASE("An outlier in one quarter is replaced, a lamp in all of them stays") 
   CHECK(findSpikes(x, x.variance, nullptr).empty());
 }
 
-TEST_CASE("An outlier that half of the samples hold leaves nothing in its neighbours either") {
+TEST_CASE("An outlier in one quarter leaves nothing in its neighbours either") {
   // Noise of 0.03 around 1, and one pixel of 200 in one quarter.
   Estimate x = flat(1.0f, 0);
   std::mt19937 random(5);
