@@ -34,6 +34,11 @@ const OptionInfo kDespike{"auto-despike", 1, "0: keep outliers"};
 constexpr uint64_t kFewestPasses = 4;       // fewer: the first filter alone
 constexpr uint64_t kFirstOrderPasses = 64;  // fewer: slopes fit noise
 
+// The careful filter is for what the wide one takes for noise, which is small: more neighbours than the 49 up to this
+// distance change no error.
+constexpr PatchWelchNeighbours kCarefulNeighbours{4, 4};
+constexpr int kFirstOrderStride = 7;  // with a careful filter beside it, fits every fifth pixel change no error either
+
 class Auto : public Method {
  public:
   const char* name() const override { return "auto"; }
@@ -80,17 +85,20 @@ std::vector<Estimate> filtersOf(const Estimate& x, const Features* features, con
   const PatchWelchInput input = patchWelchInput(x, features);
   if (input.variance.empty()) return bases;
   if (!mayBeMeasured(x)) {
-    bases.push_back(asEstimate(std::move(patchWelch(input, std::array{kPatchWelchThreshold}, {}, cancel)[0]), "pw"));
+    bases.push_back(
+        asEstimate(std::move(patchWelch(input, std::array{kPatchWelchThreshold}, {}, {}, cancel)[0]), "pw"));
     return bases;
   }
-  auto wide = patchWelch(input, std::array{kPatchWelchWideThreshold}, {}, cancel);
+  auto wide = patchWelch(input, std::array{kPatchWelchWideThreshold}, {}, {}, cancel);
   if (cancelled()) return bases;
+  FirstOrderOptions fits;
+  fits.stride = kFirstOrderStride;
   const bool firstOrder = x.passes >= kFirstOrderPasses;
-  bases.push_back(firstOrder ? asEstimate(patchWelchFirstOrder(input, wide[0], {}, cancel), "pw1")
+  bases.push_back(firstOrder ? asEstimate(patchWelchFirstOrder(input, wide[0], fits, cancel), "pw1")
                              : asEstimate(std::move(wide[0]), "pw-wide"));
   if (cancelled()) return bases;
   const PatchWelchInput robust = patchWelchInput(x, features, true);
-  auto careful = patchWelch(robust, std::array{kPatchWelchThreshold}, {}, cancel);
+  auto careful = patchWelch(robust, std::array{kPatchWelchThreshold}, kCarefulNeighbours, {}, cancel);
   bases.push_back(asEstimate(std::move(careful[0]), "pw-robust"));
   return bases;
 }

@@ -8,9 +8,9 @@
 namespace braid::test {
 
 // All pixels up to 5 away, and every second one up to 9.
-inline bool inPlainWindow(int dx, int dy) {
+inline bool inPlainWindow(int dx, int dy, double inner = 5, double outer = 9) {
   const double distance = std::hypot(dx, dy);
-  return distance <= 5 || (distance <= 9 && std::abs(dx + dy) % 2 == 0);
+  return distance <= inner || (distance <= outer && std::abs(dx + dy) % 2 == 0);
 }
 
 }  // namespace braid::test

@@ -43,7 +43,8 @@ Estimate plainEstimate(const Rgb<float>& mean, float variance) {
 // One pixel of the filter in double, straight from the formula.
 class PlainFilter {
  public:
-  PlainFilter(const PatchWelchInput& input, size_t image, double z) : input_(input), image_(image) {
+  PlainFilter(const PatchWelchInput& input, size_t image, double z, const PatchWelchNeighbours& neighbours = {})
+      : input_(input), image_(image), neighbours_(neighbours) {
     t2_ = sqr(studentQuantile(z, 2 * input.passes - 2));
   }
 
@@ -51,7 +52,7 @@ class PlainFilter {
     double total = 0, sum[3] = {0, 0, 0};
     for (int v = std::max(0, y - 9); v <= std::min(input_.height() - 1, y + 9); ++v)
       for (int u = std::max(0, x - 9); u <= std::min(input_.width() - 1, x + 9); ++u) {
-        if (!inPlainWindow(u - x, v - y)) continue;
+        if (!inPlainWindow(u - x, v - y, neighbours_.inner, neighbours_.outer)) continue;
         const double w = weight(x, y, u, v);
         total += w;
         for (size_t c = 0; c < 3; ++c) sum[c] += w * radiance(u, v, c);
@@ -100,6 +101,7 @@ class PlainFilter {
 
   const PatchWelchInput& input_;
   size_t image_;
+  PatchWelchNeighbours neighbours_;
   double t2_;
 };
 
@@ -171,6 +173,17 @@ TEST_CASE("The filter is what its formula says, at borders, with and without fea
   }
 }
 
+TEST_CASE("Fewer neighbours give the filter without the others") {
+  const Case c = caseOf(60, 41, 8);
+  const PatchWelchInput input = patchWelchInput(c.pt(), &featuresOf(c));
+  for (const PatchWelchNeighbours& neighbours : {PatchWelchNeighbours{4, 4}, {0, 6}, {0, 0}}) {
+    const auto images = patchWelch(input, kThresholds, neighbours);
+    for (size_t k = 0; k < kThresholds.size(); ++k)
+      for (size_t i = 0; i < 3; ++i)
+        CHECK(worstDifference(images[k][i], PlainFilter(input, i, kThresholds[k], neighbours), 3) < 1e-4);
+  }
+}
+
 TEST_CASE("Several thresholds in one pass give the bits of one pass each") {
   const Case c = caseOf(60, 41, 8);
   const auto both = patchWelch(patchWelchInput(c.pt(), &featuresOf(c)), kThresholds);
@@ -186,7 +199,7 @@ TEST_CASE("Neither tiles nor threads change a bit of the patch-Welch filter") {
   const PatchWelchInput input = patchWelchInput(c.pt(), &featuresOf(c));
   const auto usual = patchWelch(input, kThresholds);
   for (const TileSize tiles : {TileSize{17, 5}, {64, 64}, {400, 200}, {257, 1}}) {
-    const auto other = patchWelch(input, kThresholds, tiles);
+    const auto other = patchWelch(input, kThresholds, {}, tiles);
     for (size_t i = 0; i < 3; ++i) CHECK(identical(usual[1][i], other[1][i]));
   }
   for (const int threads : {1, 2, 5}) {
@@ -284,7 +297,7 @@ TEST_CASE("Emitters and misses keep their radiance undivided, black albedo is fl
   f.albedo.mean.set(2, Vec3(0, 0.2f, 1));                 // neither
   f.albedo.mean.set(3, Vec3(std::nanf(""), 0.2f, 0.3f));  // nonsense
   const PatchWelchInput input = patchWelchInput(c.pt(), &f);
-  const PatchWelchTile tile(input, {0, 0, 8, 1});
+  const PatchWelchTile tile(input, {0, 0, 8, 1}, 0);
   const auto divisor = [&](int x) {
     const auto i = static_cast<size_t>(tile.index(x, 0));
     return Vec3(tile.divisor[0][i], tile.divisor[1][i], tile.divisor[2][i]);

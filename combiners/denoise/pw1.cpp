@@ -30,8 +30,8 @@ class PatchWelchFirstOrder : public Method {
     const PatchWelchInput input = patchWelchInputOf(in, name());
     FirstOrderOptions options;
     options.threshold = thresholdOf(in, kThreshold);
-    options.stride = static_cast<int>(std::clamp(in.options.number(kStride), 1.0, 1.0 * kPatchWelchWindow));
-    const auto zeroOrder = patchWelch(input, std::array{options.threshold}, {}, in.cancel);
+    options.stride = static_cast<int>(std::clamp(in.options.number(kStride), 1.0, 1.0 * PatchWelchNeighbours().outer));
+    const auto zeroOrder = patchWelch(input, std::array{options.threshold}, {}, {}, in.cancel);
     RegressionReport report;
     MethodResult result = patchWelchResult(patchWelchFirstOrder(input, zeroOrder[0], options, in.cancel, &report));
     result.remarks = {numberAttribute(kThreshold.name, options.threshold),

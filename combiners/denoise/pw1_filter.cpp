@@ -14,7 +14,8 @@ namespace braid {
 
 namespace {
 
-constexpr int kRadius = kPatchWelchWindow, kSide = 2 * kRadius + 1;
+constexpr PatchWelchNeighbours kNeighbours;
+constexpr int kRadius = kNeighbours.outer, kSide = 2 * kRadius + 1;
 // The window and one pixel around it are copied to contiguous memory, row by row: pixels at one offset from each other
 // are then at one distance, and loops run over the whole window at once. The last two columns of a "row" of kPitch
 // belong to the border and have weight zero, as have the corners outside of the disc.
@@ -177,7 +178,7 @@ class TileRegression {
         image_{0, 0, input.width(), input.height()},
         stride_(options.stride),
         squaredThreshold_(squaredThreshold(options.threshold, input.passes)),
-        tile_(input, intersection(grown(tile, 2 * kRadius + 1), image_)),
+        tile_(input, intersection(grown(tile, 2 * kRadius + 1), image_), tile.x0),
         sumPitch_(tile.width() + 4 * kRadius) {
     const auto size = static_cast<size_t>(sumPitch_) * static_cast<size_t>(tile.height());
     sums_.resize(input.images.size());
@@ -191,7 +192,7 @@ class TileRegression {
                                            (2 * kPatchWelchSpatialSd * kPatchWelchSpatialSd));
         columns_[1].v[i] = static_cast<float>(dx) / kRadius;
         columns_[2].v[i] = static_cast<float>(dy) / kRadius;
-        inWindow_.v[i] = inPatchWelchWindow(dx, dy) ? 1.0f : 0.0f;
+        inWindow_.v[i] = kNeighbours.contain(dx, dy) ? 1.0f : 0.0f;
       }
     std::fill_n(columns_[0].v, kCount, 1.0f);
   }
@@ -238,7 +239,7 @@ class TileRegression {
   void gather(int x, int y) {
     const PixelRect window = grown({x, y, x + 1, y + 1}, kRadius + 1), pixels = intersection(window, image_);
     clipped_ = pixels.width() < kPitch || pixels.height() < kPitch;
-    const auto copy = [&](const std::vector<float>& from, Bordered& to) {
+    const auto copy = [&](const PixelBuffer<float>& from, Bordered& to) {
       if (clipped_) std::fill_n(to.v, kBorderedSize, 0.0f);
       for (int row = pixels.y0; row < pixels.y1; ++row)
         std::memcpy(to.v + (row - window.y0) * kPitch + (pixels.x0 - window.x0),
@@ -352,10 +353,10 @@ std::vector<Rgb<float>> patchWelchFirstOrder(const PatchWelchInput& input, const
                                              RegressionReport* report) {
   BRAID_ASSERT((input.images.size() == 1 || input.images.size() == 3) && zeroOrder.size() == input.images.size() &&
                options.stride >= 1 && options.tileSize >= 1);
-  std::vector<Rgb<float>> out(input.images.size(), Rgb<float>(input.width(), input.height()));
+  std::vector<Rgb<float>> out = unfilledImages(input);
   std::mutex reporting;
   forEachTile(input.width(), input.height(), options.tileSize, options.tileSize, [&](const PixelRect& tile) {
-    if (cancel && cancel->load(std::memory_order_relaxed)) return;
+    if (cancel && cancel->load(std::memory_order_relaxed)) return blacken(tile, out);
     const auto regression = std::make_unique<TileRegression>(input, options, tile);
     runVectorised([&] { regression->run(); });
     regression->write(zeroOrder, options.kappa, out);

@@ -10,8 +10,12 @@ namespace braid {
 
 namespace {
 
-constexpr int kRowUnit = 16;  // rows are computed in multiples of this; what is too much is never used
-constexpr int roundUp(int n) { return (n + kRowUnit - 1) / kRowUnit * kRowUnit; }
+// Rows are computed in whole vectors; what is too much is never used.
+constexpr int kRowUnit = PatchWelchTile::kUnit;
+constexpr int wholeVectors(int n) { return roundUp(n, kRowUnit); }
+// The buffers of rows begin so many pixels left of the tile: all that a pair of it may reach.
+constexpr int kLead = kRowUnit;
+static_assert(kLead > PatchWelchNeighbours::kMostOuter);
 
 using Rows3 = std::array<const float*, 3>;
 
@@ -39,8 +43,10 @@ void differenceRow(const Rows3& p, const Rows3& q, const Rows3& inverse, int cou
   }
 }
 
+// out = the sum of the three values around each; of in[-1] on.
 void boxRow(const float* __restrict in, int count, float* __restrict out) {
-  for (int x = 0; x < count; ++x) out[x] = (in[x] + in[x + 1]) + in[x + 2];
+  const float* __restrict left = in - 1;
+  for (int x = 0; x < count; ++x) out[x] = (left[x] + left[x + 1]) + left[x + 2];
 }
 
 // out = max(0, 1 - s / t²) with s / t² = (a + b + c) inverseCount scale; whether any is positive. Not-a-number counts
@@ -82,7 +88,7 @@ using Lanes = float __attribute__((vector_size(kRowUnit * sizeof(float))));
 
 // Sums of w and of w u for the pixels of a tile, row by row.
 struct Sums {
-  std::array<std::vector<float>, 4> plane;  // weight, then red, green, blue
+  std::array<PixelBuffer<float>, 4> plane;  // weight, then red, green, blue
 };
 
 // A row of weights and of the pixels that they belong to.
@@ -113,22 +119,24 @@ void addRows(const std::vector<WeightedRow>& rows, int count, Sums& sums, ptrdif
 // computed in the tiles of both pixels, with the same bits.
 class TileFilter {
  public:
-  TileFilter(const PatchWelchInput& input, const std::vector<float>& squaredThresholds, const PixelRect& tile)
+  TileFilter(const PatchWelchInput& input, const std::vector<float>& squaredThresholds,
+             const PatchWelchNeighbours& neighbours, const PixelRect& tile)
       : target_(tile),
         width_(input.width()),
         height_(input.height()),
         thresholds_(squaredThresholds),
-        tile_(input, intersection(grown(tile, kPatchWelchWindow + 1), {0, 0, width_, height_})),
+        neighbours_(neighbours),
+        reach_(neighbours.outer),
+        tile_(input, intersection(grown(tile, reach_ + 1), {0, 0, width_, height_}), tile.x0),
         images_(input.images.size()),
-        row_(roundUp(tile.width() + 2 * kPatchWelchWindow) + 2 * kRowUnit) {
-    const auto row = static_cast<size_t>(row_);
-    for (std::vector<float>& b : inverse_) b.resize(row);
+        columns_(static_cast<size_t>(2 * reach_ + 1)) {
+    const PixelBuffer<float> zeros(static_cast<size_t>(kLead + wholeVectors(target_.width()) + 2 * kRowUnit), 0.0f);
+    inverse_.fill(zeros);
     for (Column& column : columns_) {
-      for (auto& image : column.patchRows)
-        for (std::vector<float>& b : image) b.resize(row);
-      for (std::vector<float>* b : {&column.inverseCount, &column.weight, &column.edge}) b->resize(row);
+      for (auto& image : column.patchRows) image.fill(zeros);
+      column.inverseCount = column.weight = column.edge = zeros;
     }
-    difference_.resize(row);
+    difference_ = zeros;
     ofFirst_.reserve(columns_.size());
     ofSecond_.reserve(columns_.size());
     startAtCentre();
@@ -136,12 +144,12 @@ class TileFilter {
 
   // Row by row for all dx of a dy, so that the rows that they share stay in the cache.
   void run() {
-    for (int dy = 0; dy <= kPatchWelchWindow; ++dy) {
+    for (int dy = 0; dy <= reach_; ++dy) {
       const int y0 = std::max(target_.y0 - dy, 0), y1 = std::min(target_.y1, height_ - dy);
       if (y0 >= y1) continue;
-      for (int dx = -kPatchWelchWindow; dx <= kPatchWelchWindow; ++dx) begin(dx, dy);
+      for (int dx = -reach_; dx <= reach_; ++dx) begin(dx, dy);
       for (int y = y0 - 1; y <= y1; ++y) {
-        for (int dx = -kPatchWelchWindow; dx <= kPatchWelchWindow; ++dx)
+        for (int dx = -reach_; dx <= reach_; ++dx)
           if (!columnOf(dx).p.empty()) patchRow(columnOf(dx), y, dx, dy);
         if (y > y0) accumulate(y - 1, dy);
       }
@@ -166,18 +174,18 @@ class TileFilter {
  private:
   // Rows of sums are whole vectors.
   ptrdiff_t sumIndex(int x, int y) const {
-    return static_cast<ptrdiff_t>(y - target_.y0) * roundUp(target_.width()) + (x - target_.x0);
+    return static_cast<ptrdiff_t>(y - target_.y0) * wholeVectors(target_.width()) + (x - target_.x0);
   }
 
   // The weight of a pixel with itself is 1.
   void startAtCentre() {
-    const auto area = static_cast<size_t>(roundUp(target_.width())) * static_cast<size_t>(target_.height());
+    const auto area = static_cast<size_t>(wholeVectors(target_.width())) * static_cast<size_t>(target_.height());
     sums_.resize(thresholds_.size() * images_);
     for (size_t k = 0; k < sums_.size(); ++k) {
-      sums_[k].plane[0].assign(area, 1.0f);
+      sums_[k].plane[0] = PixelBuffer<float>(area, 1.0f);
       for (size_t c = 0; c < 3; ++c) {
-        sums_[k].plane[1 + c].resize(area);
-        const std::vector<float>& u = tile_.radiance[k % images_][c];
+        sums_[k].plane[1 + c] = PixelBuffer<float>(area, 0.0f);
+        const PixelBuffer<float>& u = tile_.radiance[k % images_][c];
         for (int y = target_.y0; y < target_.y1; ++y)
           std::copy_n(u.data() + tile_.index(target_.x0, y), target_.width(),
                       sums_[k].plane[1 + c].data() + sumIndex(target_.x0, y));
@@ -187,29 +195,36 @@ class TileFilter {
 
   // What is kept of an offset while the rows go by.
   struct Column {
-    PixelRect p, pairs;  // the pixels p of pairs (p, p + d) with a pixel in the tile, and of those in the image
+    PixelRect p, pairs;      // the pixels p of pairs (p, p + d) with a pixel in the tile, and of those in the image
+    int begin = 0, end = 0;  // p's columns in the buffers of rows, as whole vectors
     float spatial = 0;
-    std::array<std::array<std::vector<float>, 3>, PatchWelchInput::kMaxImages> patchRows;  // the last three
-    std::vector<float> inverseCount;
-    // Of the row and image at hand, from the leftmost pixel on that a pair of the tile may have; zero where there is
-    // none.
-    std::vector<float> weight, edge;
+    std::array<std::array<PixelBuffer<float>, 3>, PatchWelchInput::kMaxImages> patchRows;  // the last three
+    PixelBuffer<float> inverseCount;
+    PixelBuffer<float> weight, edge;  // of the row and image at hand; weights are zero outside of p
     bool edgeReady = false;
-    float* patchRow(size_t image, int y) { return patchRows[image][static_cast<size_t>(y + 3) % 3].data(); }
+    float* patchRow(size_t image, int y) { return patchRows[image][static_cast<size_t>(y + 3) % 3].data() + begin; }
   };
-  Column& columnOf(int dx) { return columns_[static_cast<size_t>(dx + kPatchWelchWindow)]; }
+  Column& columnOf(int dx) { return columns_[static_cast<size_t>(dx + reach_)]; }
+
+  // Where the pixels of column x are in the buffers of rows.
+  int position(int x) const { return x - target_.x0 + kLead; }
+  // The pixel at such a position.
+  ptrdiff_t tileIndex(int at, int y) const { return tile_.index(target_.x0 - kLead + at, y); }
 
   // dy >= 0; of d and -d one only.
   void begin(int dx, int dy) {
     Column& column = columnOf(dx);
     column.p = {};
-    if (!inPatchWelchWindow(dx, dy) || (dy == 0 && dx <= 0)) return;
+    if (!neighbours_.contain(dx, dy) || (dy == 0 && dx <= 0)) return;
     const PixelRect reach = {target_.x0 - std::max(dx, 0), target_.y0 - dy, target_.x1 + std::max(-dx, 0), target_.y1};
     column.pairs = pairsAt(dx, dy, width_, height_);
     column.p = intersection(reach, column.pairs);
+    if (column.p.empty()) return;
+    column.begin = position(column.p.x0) / kRowUnit * kRowUnit;
+    column.end = wholeVectors(position(column.p.x1));
     std::fill(column.weight.begin(), column.weight.end(), 0.0f);
     for (int x = column.p.x0; x < column.p.x1; ++x)
-      column.inverseCount[static_cast<size_t>(x - column.p.x0)] =
+      column.inverseCount[static_cast<size_t>(position(x))] =
           1.0f / static_cast<float>(3 * patchCount(x, 1, column.pairs.x0, column.pairs.x1));
     const double distance2 = dx * dx + dy * dy;
     column.spatial = static_cast<float>(-static_cast<double>(kLog2E) * distance2 /
@@ -219,22 +234,23 @@ class TileFilter {
   // Row y of z², summed over three neighbours in x, of every image; zeros outside the image.
   void patchRow(Column& column, int y, int dx, int dy) {
     const PixelRect &p = column.p, &pairs = column.pairs;
-    const int count = roundUp(p.width());
+    const int count = column.end - column.begin;
     if (y < pairs.y0 || y >= pairs.y1) {
       for (size_t i = 0; i < images_; ++i) std::fill_n(column.patchRow(i, y), count, 0.0f);
       return;
     }
-    const int x0 = std::max(p.x0 - 1, pairs.x0), x1 = std::min(p.x1 + 1, pairs.x1), padded = roundUp(x1 - x0);
-    const ptrdiff_t at = tile_.index(x0, y), to = tile_.index(x0 + dx, y + dy);
-    inverseVarianceRow(rowsAt(tile_.variance, at), rowsAt(tile_.variance, to), padded,
-                       {inverse_[0].data(), inverse_[1].data(), inverse_[2].data()});
-    float* z2 = difference_.data() + (x0 - (p.x0 - 1));  // difference_[0] belongs to p.x0 - 1
-    difference_[0] = 0;
+    const int x0 = position(std::max(p.x0 - 1, pairs.x0)), x1 = position(std::min(p.x1 + 1, pairs.x1));
+    const int first = x0 / kRowUnit * kRowUnit, last = wholeVectors(x1);
+    const ptrdiff_t at = tileIndex(first, y), to = tileIndex(first + dx, y + dy);
+    const std::array<float*, 3> inverse = {inverse_[0].data(), inverse_[1].data(), inverse_[2].data()};
+    inverseVarianceRow(rowsAt(tile_.variance, at), rowsAt(tile_.variance, to), last - first, inverse);
+    float* z2 = difference_.data();
     for (size_t i = 0; i < images_; ++i) {
-      differenceRow(rowsAt(tile_.radiance[i], at), rowsAt(tile_.radiance[i], to),
-                    {inverse_[0].data(), inverse_[1].data(), inverse_[2].data()}, padded, z2);
-      std::fill(z2 + (x1 - x0), z2 + padded + 2, 0.0f);
-      boxRow(difference_.data(), count, column.patchRow(i, y));
+      differenceRow(rowsAt(tile_.radiance[i], at), rowsAt(tile_.radiance[i], to), {inverse[0], inverse[1], inverse[2]},
+                    last - first, z2 + first);
+      std::fill(z2 + std::max(first - 1, 0), z2 + x0, 0.0f);
+      std::fill(z2 + x1, z2 + last + 1, 0.0f);
+      boxRow(z2 + column.begin, count, column.patchRow(i, y));
     }
   }
 
@@ -245,11 +261,11 @@ class TileFilter {
       for (size_t k = 0; k < thresholds_.size(); ++k) {
         ofFirst_.clear();
         ofSecond_.clear();
-        for (int dx = -kPatchWelchWindow; dx <= kPatchWelchWindow; ++dx)
+        for (int dx = -reach_; dx <= reach_; ++dx)
           if (!columnOf(dx).p.empty() && weigh(columnOf(dx), y, dx, dy, i, thresholds_[k]))
             listRows(columnOf(dx), y, dx, dy, tile_.radiance[i]);
         Sums& sums = sums_[k * images_ + i];
-        const int count = roundUp(target_.width());
+        const int count = wholeVectors(target_.width());
         if (y >= target_.y0) addRows(ofFirst_, count, sums, sumIndex(target_.x0, y));
         if (y + dy < target_.y1) addRows(ofSecond_, count, sums, sumIndex(target_.x0, y + dy));
       }
@@ -257,41 +273,42 @@ class TileFilter {
 
   // Row y of the weights of an image; whether any is positive.
   bool weigh(Column& column, int y, int dx, int dy, size_t image, float squaredThreshold) {
-    const PixelRect &p = column.p, &pairs = column.pairs;
-    const int count = roundUp(p.width());
+    const PixelRect& pairs = column.pairs;
+    const int begin = column.begin, count = column.end - begin;
     const float inverseRows = 1.0f / static_cast<float>(patchCount(y, 1, pairs.y0, pairs.y1));
     const float scale = inverseRows / (squaredThreshold * PatchWelchInput::varianceFactor(image));
-    float* weight = column.weight.data() + weightIndex(p.x0);
+    float *weight = column.weight.data() + begin, *edge = column.edge.data() + begin;
     if (!toleranceRow({column.patchRow(image, y - 1), column.patchRow(image, y), column.patchRow(image, y + 1)},
-                      column.inverseCount.data(), scale, count, weight))
+                      column.inverseCount.data() + begin, scale, count, weight))
       return false;
     if (!column.edgeReady)
-      edgeRow(tile_, tile_.index(p.x0, y), tile_.index(p.x0 + dx, y + dy), column.spatial, count, column.edge.data());
+      edgeRow(tile_, tileIndex(begin, y), tileIndex(begin + dx, y + dy), column.spatial, count, edge);
     column.edgeReady = true;
-    weightRow(weight, column.edge.data(), count);
-    std::fill(weight + p.width(), weight + count, 0.0f);
+    weightRow(weight, edge, count);
+    std::fill(weight, weight + (position(column.p.x0) - begin), 0.0f);
+    std::fill(weight + (position(column.p.x1) - begin), weight + count, 0.0f);
     return true;
   }
 
   // The weights of a dx add q to the sums of p, and p to those of q.
   void listRows(const Column& column, int y, int dx, int dy, const PatchWelchTile::Plane3& u) {
-    const float* weight = column.weight.data();
-    ofFirst_.push_back({weight + weightIndex(target_.x0), rowsAt(u, tile_.index(target_.x0 + dx, y + dy))});
-    ofSecond_.push_back({weight + weightIndex(target_.x0 - dx), rowsAt(u, tile_.index(target_.x0 - dx, y))});
+    const float* weight = column.weight.data() + kLead;
+    ofFirst_.push_back({weight, rowsAt(u, tile_.index(target_.x0 + dx, y + dy))});
+    ofSecond_.push_back({weight - dx, rowsAt(u, tile_.index(target_.x0 - dx, y))});
   }
-
-  ptrdiff_t weightIndex(int x) const { return x - (target_.x0 - kPatchWelchWindow); }
 
   PixelRect target_;
   int width_, height_;  // of the image
   const std::vector<float>& thresholds_;
+  PatchWelchNeighbours neighbours_;
+  int reach_;  // the largest distance in x and in y of a neighbour
   PatchWelchTile tile_;
   size_t images_;
-  int row_;                 // floats of a row of any buffer
-  std::vector<Sums> sums_;  // [threshold][image]
-  std::array<std::vector<float>, 3> inverse_;
-  std::array<Column, 2 * kPatchWelchWindow + 1> columns_;  // by dx
-  std::vector<float> difference_;
+  std::vector<Sums> sums_;       // [threshold][image]
+  std::vector<Column> columns_;  // by dx
+  // Buffers of rows; see position().
+  std::array<PixelBuffer<float>, 3> inverse_;
+  PixelBuffer<float> difference_;
   std::vector<WeightedRow> ofFirst_, ofSecond_;  // what is added to the sums of p, and of q
 };
 
@@ -327,17 +344,34 @@ float squaredThreshold(double z, uint64_t passes) {
   return static_cast<float>(t * t);
 }
 
+std::vector<Rgb<float>> unfilledImages(const PatchWelchInput& input) {
+  std::vector<Rgb<float>> images;
+  for (size_t i = 0; i < input.images.size(); ++i) images.emplace_back(input.width(), input.height(), kUnfilled);
+  return images;
+}
+
+void blacken(const PixelRect& tile, std::vector<Rgb<float>>& images) {
+  for (Rgb<float>& image : images)
+    for (Plane<float>& plane : image.channel)
+      for (int y = tile.y0; y < tile.y1; ++y) std::fill_n(&plane.at(tile.x0, y), tile.width(), 0.0f);
+}
+
 std::vector<std::vector<Rgb<float>>> patchWelch(const PatchWelchInput& input, std::span<const double> thresholds,
-                                                TileSize tiles, const std::atomic<bool>* cancel) {
+                                                const PatchWelchNeighbours& neighbours, TileSize tiles,
+                                                const std::atomic<bool>* cancel) {
   BRAID_ASSERT(!thresholds.empty() && !input.images.empty() && input.images.size() <= PatchWelchInput::kMaxImages);
+  BRAID_ASSERT(neighbours.inner <= neighbours.outer && neighbours.outer <= PatchWelchNeighbours::kMostOuter);
   const int width = input.width(), height = input.height();
-  std::vector<std::vector<Rgb<float>>> out(thresholds.size(),
-                                           std::vector<Rgb<float>>(input.images.size(), Rgb<float>(width, height)));
+  std::vector<std::vector<Rgb<float>>> out(thresholds.size());
+  for (std::vector<Rgb<float>>& images : out) images = unfilledImages(input);
   std::vector<float> squared;
   for (const double z : thresholds) squared.push_back(squaredThreshold(z, input.passes));
   forEachTile(width, height, tiles.width, tiles.height, [&](const PixelRect& tile) {
-    if (cancel && cancel->load(std::memory_order_relaxed)) return;
-    TileFilter filter(input, squared, tile);
+    if (cancel && cancel->load(std::memory_order_relaxed)) {
+      for (std::vector<Rgb<float>>& images : out) blacken(tile, images);
+      return;
+    }
+    TileFilter filter(input, squared, neighbours, tile);
     runVectorised([&] { filter.run(); });
     filter.write(out);
   });

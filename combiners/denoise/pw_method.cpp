@@ -29,7 +29,7 @@ class PatchWelch : public Method {
   MethodResult run(const MethodInputs& in) const override {
     const PatchWelchInput input = patchWelchInputOf(in, name_);
     const std::array<double, 1> thresholds = {thresholdOf(in, threshold_)};
-    MethodResult result = patchWelchResult(std::move(patchWelch(input, thresholds, {}, in.cancel)[0]));
+    MethodResult result = patchWelchResult(std::move(patchWelch(input, thresholds, {}, {}, in.cancel)[0]));
     result.remarks.push_back(numberAttribute(threshold_.name, thresholds[0]));
     return result;
   }

@@ -71,27 +71,33 @@ PatchWelchInput patchWelchInput(const Estimate& estimate, const Features* featur
   return input;
 }
 
-PatchWelchTile::PatchWelchTile(const PatchWelchInput& input, const PixelRect& pixels)
-    : rect(pixels), pitch(pixels.width() + kPadding), radiance(input.images.size()) {
+PatchWelchTile::PatchWelchTile(const PatchWelchInput& input, const PixelRect& pixels, int alignedColumn)
+    : rect(pixels),
+      radiance(input.images.size()),
+      begin_(alignedColumn - roundUp(alignedColumn - pixels.x0 + kMargin, kUnit)) {
   BRAID_ASSERT(!input.variance.empty() && input.variance.size() == input.images[0]->size());
-  const auto size = static_cast<size_t>(pitch) * static_cast<size_t>(rect.height());
-  for (Plane3& image : radiance)
-    for (std::vector<float>& plane : image) plane.assign(size, 0.0f);
-  for (std::vector<float>& plane : variance) plane.assign(size, 0.0f);
-  for (std::vector<float>& plane : divisor) plane.assign(size, 1.0f);
-  for (std::vector<float>& plane : guide) plane.assign(size, 0.0f);
-  depth.assign(size, 0.0f);
-  visibility.assign(size, 0.0f);
+  pitch = roundUp(rect.x1 + kMargin - begin_, kUnit);
+  const size_t size = static_cast<size_t>(pitch) * static_cast<size_t>(rect.height());
+  const PixelBuffer<float> zeros(size, 0.0f);
+  for (Plane3& image : radiance) image.fill(zeros);
+  variance.fill(zeros);
+  divisor.fill(PixelBuffer<float>(size, 1.0f));
+  guide.fill(zeros);
+  depth = visibility = zeros;
+  runVectorised([&] {
+    for (int y = rect.y0; y < rect.y1; ++y) storeRow(input, y);
+  });
+}
+
+void PatchWelchTile::storeRow(const PatchWelchInput& input, int y) {
+  const size_t from = input.variance[0].index(rect.x0, y);
+  const auto at = static_cast<size_t>(index(rect.x0, y));
   const int count = rect.width();
-  for (int y = rect.y0; y < rect.y1; ++y) {
-    const size_t from = input.variance[0].index(rect.x0, y);
-    const auto at = static_cast<size_t>(index(rect.x0, y));
-    if (input.features) storeFeatures(*input.features, input.depthScale, from, at);
-    for (size_t c = 0; c < 3; ++c) {
-      divideBySquareRow(&input.variance[c][from], &divisor[c][at], count, &variance[c][at]);
-      for (size_t k = 0; k < radiance.size(); ++k)
-        divideRow(&(*input.images[k])[c][from], &divisor[c][at], count, &radiance[k][c][at]);
-    }
+  if (input.features) storeFeatures(*input.features, input.depthScale, from, at);
+  for (size_t c = 0; c < 3; ++c) {
+    divideBySquareRow(&input.variance[c][from], &divisor[c][at], count, &variance[c][at]);
+    for (size_t k = 0; k < radiance.size(); ++k)
+      divideRow(&(*input.images[k])[c][from], &divisor[c][at], count, &radiance[k][c][at]);
   }
 }
 

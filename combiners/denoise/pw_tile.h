@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "combiners/denoise/window.h"
+#include "renderer/core/pixel_buffer.h"
 #include "renderer/film/estimates.h"
 
 namespace braid {
@@ -35,11 +36,11 @@ struct PatchWelchInput {
 PatchWelchInput patchWelchInput(const Estimate& estimate, const Features* features, bool robustVariance = false);
 
 // Contiguous copies of the pixels of a rectangle. Non-finite values are zero. Rows are padded so that whole vectors
-// may be read before their beginnings and past their ends, by up to half the padding.
+// may be read before their beginnings and past their ends, by up to 32 values.
 struct PatchWelchTile {
-  static constexpr int kPadding = 64;
+  static constexpr int kMargin = 32, kUnit = 16;  // floats of half a row's padding, and of the widest vector
   static constexpr size_t kGuides = 6;
-  using Plane3 = std::array<std::vector<float>, 3>;
+  using Plane3 = std::array<PixelBuffer<float>, 3>;
 
   PixelRect rect;  // of the image
   ptrdiff_t pitch = 0;
@@ -48,15 +49,17 @@ struct PatchWelchTile {
   Plane3 divisor;                // max(albedo, 0.03); 1 on emitters, misses and without features
   // Albedo in [0, 1] and normal, times sqrt(log2(e) / (2 sd²)): 2^-|difference|² is the product of both Gaussian edge
   // terms. Zero without features.
-  std::array<std::vector<float>, kGuides> guide;
-  std::vector<float> depth, visibility;  // depth in units of the mean depth; zero without features
+  std::array<PixelBuffer<float>, kGuides> guide;
+  PixelBuffer<float> depth, visibility;  // depth in units of the mean depth; zero without features
 
-  PatchWelchTile(const PatchWelchInput& input, const PixelRect& pixels);
-  ptrdiff_t index(int x, int y) const {
-    return static_cast<ptrdiff_t>(y - rect.y0) * pitch + (x - rect.x0) + kPadding / 2;
-  }
+  // In every row the pixel of the column `alignedColumn`, one of the rectangle's, is aligned for the widest vectors.
+  PatchWelchTile(const PatchWelchInput& input, const PixelRect& pixels, int alignedColumn);
+  ptrdiff_t index(int x, int y) const { return static_cast<ptrdiff_t>(y - rect.y0) * pitch + (x - begin_); }
 
  private:
+  int begin_;  // the column that rows begin with, outside of the rectangle
+
+  void storeRow(const PatchWelchInput& input, int y);
   void storeFeatures(const Features& features, float depthScale, size_t from, size_t at);  // of a row
 };
 

@@ -19,6 +19,9 @@
 
 namespace braid {
 
+// The least multiple of `unit` that is not below n >= 0.
+constexpr int roundUp(int n, int unit) { return (n + unit - 1) / unit * unit; }
+
 // Pixels x0 <= x < x1, y0 <= y < y1.
 struct PixelRect {
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
