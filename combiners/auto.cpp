@@ -67,10 +67,10 @@ Estimate asEstimate(std::vector<Rgb<float>> images, const char* name) {
 }
 
 MethodMemory Auto::memory(const MemoryCase& of) const {
-  const int fused = of.photonMaps > 0 ? 110 : 0, others = of.bases - of.photonMaps;
+  const int fused = of.photonMaps > 0 ? 112 : 0, others = of.bases - of.photonMaps;
   if (of.passes > 0 && of.passes < kFewestPasses) return {96 + fused + 36 * others, 36};
   const int bases = others + 2;
-  return {124 + 80 * bases + fused, 40 + 8 * bases};
+  return {44 + 88 * bases + fused, 40 + 8 * bases};
 }
 
 // Whether errors can be measured across halves. Images of other renderers may not tell their passes.
@@ -82,20 +82,22 @@ std::vector<Estimate> filtersOf(const Estimate& x, const Features* features, con
   const auto cancelled = [&] { return cancel && cancel->load(); };
   std::vector<Estimate> bases;
   if (cancelled()) return bases;
-  const PatchWelchInput input = patchWelchInput(x, features);
-  if (input.variance.empty()) return bases;
-  if (!mayBeMeasured(x)) {
-    bases.push_back(
-        asEstimate(std::move(patchWelch(input, std::array{kPatchWelchThreshold}, {}, {}, cancel)[0]), "pw"));
-    return bases;
+  {
+    const PatchWelchInput input = patchWelchInput(x, features);
+    if (input.variance.empty()) return bases;
+    if (!mayBeMeasured(x)) {
+      bases.push_back(
+          asEstimate(std::move(patchWelch(input, std::array{kPatchWelchThreshold}, {}, {}, cancel)[0]), "pw"));
+      return bases;
+    }
+    auto wide = std::move(patchWelch(input, std::array{kPatchWelchWideThreshold}, {}, {}, cancel)[0]);
+    if (cancelled()) return bases;
+    FirstOrderOptions fits;
+    fits.stride = kFirstOrderStride;
+    const bool firstOrder = x.passes >= kFirstOrderPasses;
+    if (firstOrder) wide = patchWelchFirstOrder(input, std::move(wide), fits, cancel);
+    bases.push_back(asEstimate(std::move(wide), firstOrder ? "pw1" : "pw-wide"));
   }
-  auto wide = patchWelch(input, std::array{kPatchWelchWideThreshold}, {}, {}, cancel);
-  if (cancelled()) return bases;
-  FirstOrderOptions fits;
-  fits.stride = kFirstOrderStride;
-  const bool firstOrder = x.passes >= kFirstOrderPasses;
-  bases.push_back(firstOrder ? asEstimate(patchWelchFirstOrder(input, wide[0], fits, cancel), "pw1")
-                             : asEstimate(std::move(wide[0]), "pw-wide"));
   if (cancelled()) return bases;
   const PatchWelchInput robust = patchWelchInput(x, features, true);
   auto careful = patchWelch(robust, std::array{kPatchWelchThreshold}, kCarefulNeighbours, {}, cancel);
@@ -110,6 +112,7 @@ Estimate baseOf(const Estimate& base, const Estimate& x, bool fused, const Metho
   if (method->kind() != MethodKind::Denoiser) return base;
   MethodInputs again = in;
   again.unbiased = &x;
+  again.expendable = nullptr;
   Estimate out = method->run(again).image;
   out.name = base.name;
   return hasHalves(out) ? out : base;
@@ -127,7 +130,7 @@ Estimate consistentHalves(const Estimate& base) {
 }
 
 // x shrunk towards each base, and each half of x towards the base's half.
-std::vector<Estimate> shrunkTowards(const std::vector<Estimate>& bases, const Estimate& x, const Rgb<float>& variance,
+std::vector<Estimate> shrunkTowards(const std::vector<Estimate>& bases, const Estimate& x,
                                     const std::atomic<bool>* cancel) {
   JamesSteinSettings settings;
   settings.constant = 1;
@@ -143,10 +146,10 @@ std::vector<Estimate> shrunkTowards(const std::vector<Estimate>& bases, const Es
       partOf(out[b]) = jamesStein(image, noise, scale, partOf(bases[b]), settings).image;
   };
   shrink(
-      x.mean, variance, [](auto& e) -> auto& { return e.mean; });
+      x.mean, x.variance, [](auto& e) -> auto& { return e.mean; });
   for (size_t h = 0; h < 2; ++h)
     shrink(
-        x.half[h], halfVariance(x, variance, static_cast<int>(h)), [h](auto& e) -> auto& { return e.half[h]; });
+        x.half[h], halfVariance(x, x.variance, static_cast<int>(h)), [h](auto& e) -> auto& { return e.half[h]; });
   return out;
 }
 
@@ -158,16 +161,15 @@ Attribute countRemark(const char* name, size_t count) {
   return a;
 }
 
-// What is read of x from here on, with the replacements; `variance` holds them already.
-Estimate withReplacements(const Estimate& x, const Rgb<float>& variance, const std::vector<Spike>& spikes) {
+// What the steps after the first read of an estimate whose halves tell something.
+Estimate whatIsRead(const Estimate& e) {
   Estimate out;
-  out.name = x.name;
-  out.correlation = x.correlation;
-  out.passes = x.passes;
-  out.mean = x.mean;
-  for (size_t h = 0; h < 2; ++h) out.half[h] = x.half[h];
-  for (Rgb<float>* image : {&out.mean, &out.half[0], &out.half[1]}) replaceValues(*image, spikes);
-  out.variance = variance;
+  out.name = e.name;
+  out.correlation = e.correlation;
+  out.passes = e.passes;
+  out.mean = e.mean;
+  for (size_t h = 0; h < 2; ++h) out.half[h] = e.half[h];
+  out.variance = meanVariance(e);
   return out;
 }
 
@@ -183,18 +185,30 @@ MethodResult Auto::run(const MethodInputs& in) const {
     (!b->bias.empty() && in.options.number(kFuse) != 0 ? photonMaps : others).push_back(b);
   FusedEstimate fused;
   if (!photonMaps.empty()) fused = fusedEstimate(*in.unbiased, photonMaps, in.features);
-  const Estimate& whole = photonMaps.empty() ? *in.unbiased : fused.image;
-  Rgb<float> variance;
-  if (mayBeMeasured(whole)) variance = meanVariance(whole);
-  Estimate clean;
-  if (in.options.number(kDespike) != 0 && mayBeMeasured(whole)) {
-    const std::vector<Spike> spikes = findSpikes(whole, variance, in.features);
-    result.remarks.push_back(countRemark("replacedOutliers", spikes.size()));
-    replaceVariances(variance, spikes);
-    if (!fused.noise.empty()) replaceVariances(fused.noise, spikes);
-    if (!spikes.empty()) clean = withReplacements(whole, variance, spikes);
+  Estimate* own =
+      photonMaps.empty() ? in.expendable : &fused.image;  // the unbiased or fused image, if it may be changed
+  Estimate copy;
+  const auto changeable = [&](const Estimate& e) -> Estimate& {
+    if (!own) own = &(copy = whatIsRead(e));
+    return *own;
+  };
+  const Estimate* whole = photonMaps.empty() ? in.unbiased : &fused.image;
+  if (mayBeMeasured(*whole) && whole->variance.empty()) {
+    whole = &changeable(*whole);
+    own->variance = meanVariance(*whole);
   }
-  const Estimate& x = clean.mean.empty() ? whole : clean;
+  if (in.options.number(kDespike) != 0 && mayBeMeasured(*whole)) {
+    const std::vector<Spike> spikes = findSpikes(*whole, whole->variance, in.features);
+    result.remarks.push_back(countRemark("replacedOutliers", spikes.size()));
+    if (!fused.noise.empty()) replaceVariances(fused.noise, spikes);
+    if (!spikes.empty()) {
+      Estimate& clean = changeable(*whole);
+      for (Rgb<float>* image : {&clean.mean, &clean.half[0], &clean.half[1]}) replaceValues(*image, spikes);
+      replaceVariances(clean.variance, spikes);
+      whole = &clean;
+    }
+  }
+  const Estimate& x = *whole;
   std::vector<Estimate> bases;
   for (const Estimate* b : others) bases.push_back(consistentHalves(baseOf(*b, x, !photonMaps.empty(), in)));
   for (Estimate& e : filtersOf(x, in.features, in.cancel)) bases.push_back(std::move(e));
@@ -205,20 +219,23 @@ MethodResult Auto::run(const MethodInputs& in) const {
     return result;
   }
   std::vector<Estimate> shrunk;
-  if (in.options.number(kShrink) != 0) shrunk = shrunkTowards(bases, x, variance, in.cancel);
+  if (in.options.number(kShrink) != 0) shrunk = shrunkTowards(bases, x, in.cancel);
   if (cancelled()) return result;
   std::vector<const Estimate*> candidates;
   for (const Estimate& e : shrunk) candidates.push_back(&e);
   for (const Estimate& e : bases) candidates.push_back(&e);
   const int patchRadius = static_cast<int>(std::clamp(in.options.number(kPatch), 1.0, 101.0)) / 2;
-  const WeightMaps weights = relativeWeights(x, candidates, bases.back().mean, variance, in.features, patchRadius);
+  const WeightMaps weights = relativeWeights(x, candidates, bases.back().mean, x.variance, in.features, patchRadius);
   if (cancelled()) return result;
   result.image = weightedEstimate(weights, candidates);
-  result.error = errorMap(result.image.half, x, fused.noise.empty() ? variance : fused.noise, result.image.mean, true);
-  if (!fused.squaredBias.empty()) addTo(result.error, smoothedSquaredBias(fused.squaredBias, result.image.mean));
   std::vector<Plane<float>> maps = channelMeans(weights);
   for (size_t b = 0; b < candidates.size(); ++b)
     result.aovs.push_back({"weight.auto." + layerName(candidates[b]->name), std::move(maps[b])});
+  shrunk.clear();  // their memory is what the error map needs
+  bases.clear();
+  result.error =
+      errorMap(result.image.half, x, fused.noise.empty() ? x.variance : fused.noise, result.image.mean, true);
+  if (!fused.squaredBias.empty()) addTo(result.error, smoothedSquaredBias(fused.squaredBias, result.image.mean));
   return result;
 }
 

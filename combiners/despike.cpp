@@ -38,7 +38,9 @@ std::vector<char> candidates(const Rgb<float>& variance) {
   });
   const Plane<double> around = mirrorBoxMean(deviation, kDeviationRadius);
   std::vector<char> out(deviation.size());
-  for (size_t i = 0; i < out.size(); ++i) out[i] = static_cast<double>(deviation[i]) > kDeviationRatio * around[i];
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) out[i] = static_cast<double>(deviation[i]) > kDeviationRatio * around[i];
+  });
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include "combiners/finite_float.h"
 #include "combiners/simplex_solver.h"
 #include "renderer/core/error.h"
+#include "renderer/core/window_sums.h"
 
 namespace braid {
 
@@ -17,30 +18,9 @@ constexpr int kTileWidth = 128, kTileHeight = 32;
 // Row `y` of a plane from column x on.
 const float* rowOf(const Plane<float>& p, int x, int y) { return p.data.data() + p.index(x, y); }
 
-void addRow(const double* __restrict in, int count, double* __restrict out) {
-  for (int x = 0; x < count; ++x) out[x] += in[x];
-}
-
 void addWeighted(const float* __restrict weight, const float* __restrict image, std::vector<double>& sum) {
   double* __restrict out = sum.data();
   for (size_t i = 0; i < sum.size(); ++i) out[i] += static_cast<double>(weight[i]) * static_cast<double>(image[i]);
-}
-
-// out[x] = the sum of the n values from in[x] on, put together from sums of 1, 2, 4, … of them. `in` holds
-// count + n - 1 values and is overwritten, as is `spare`, of the same size.
-void windowSums(double* in, double* spare, int count, int n, double* out) {
-  std::fill_n(out, count, 0.0);
-  for (int power = 1, at = 0;; power *= 2) {
-    if (n & power) {
-      addRow(in + at, count, out);
-      at += power;
-    }
-    if (2 * power > n) return;
-    const double* __restrict first = in, * __restrict second = in + power;
-    double* __restrict both = spare;
-    for (int x = 0; x < count + n - 2 * power; ++x) both[x] = first[x] + second[x];
-    std::swap(in, spare);
-  }
 }
 
 // Solves the pixels of one tile.
@@ -139,7 +119,7 @@ void TileWeights::addChannels(size_t first, size_t last) {
       for (size_t j = 0; j <= i; ++j, ++pair) {
         addProducts(i, j, last - first);
         for (int row = from; tile_.y0 + row * stride < std::min(tile_.y1, y + radius + 1); ++row)
-          addRow(products_.data(), count, sumsOfRow(pair, row));
+          addValues(products_.data(), count, sumsOfRow(pair, row));
       }
   }
 }

@@ -25,13 +25,13 @@ Plane<float> varianceSamples(const Rgb<float> (&halves)[2]) {
 }
 
 // What errors are measured in to be relative: the squared brightness + 0.01.
-Plane<double> relativeUnits(const Rgb<float>& guide) {
-  Plane<double> unit(guide.width(), guide.height());
+Plane<float> relativeUnits(const Rgb<float>& guide) {
+  Plane<float> unit(guide.width(), guide.height(), kUnfilled);
   parallelChunks(unit.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       double level = 0;
       for (size_t c = 0; c < 3; ++c) level += static_cast<double>(guide[c][i]) / 3;
-      unit[i] = level * level + 0.01;
+      unit[i] = finiteFloat(level * level + 0.01);
     }
   });
   return unit;
@@ -76,42 +76,48 @@ Plane<float> squaredErrorSamples(const Rgb<float> (&halves)[2], const Estimate& 
 
 Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
                       const Rgb<float>& guide, bool follows) {
-  const int width = guide.width(), height = guide.height();
-  const Plane<float> samples = squaredErrorSamples(halves, unbiased, variance);
-  const Plane<float> spread = varianceSamples(halves);
-  const Plane<double> unit = relativeUnits(guide);
-  Plane<double> noise(width, height), bias(width, height), level;
-  if (follows) level = Plane<double>(width, height);
+  // The planes take the relative values in the place of the samples, and the mean errors in the place of a mean.
+  Plane<float> samples = squaredErrorSamples(halves, unbiased, variance);
+  Plane<float> spread = varianceSamples(halves);
+  const Plane<float> unit = relativeUnits(guide);
+  Plane<float> levels;
+  if (follows) levels = Plane<float>(guide.width(), guide.height(), kUnfilled);
   parallelChunks(unit.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       double v = 0;
       for (size_t c = 0; c < 3; ++c) v += static_cast<double>(variance[c][i]) / 3;
-      noise[i] = static_cast<double>(spread[i]) / unit[i];
-      bias[i] = (static_cast<double>(samples[i]) - static_cast<double>(spread[i])) / (unit[i] + v);
-      if (follows) level[i] = v / (unit[i] + v);
+      const auto u = static_cast<double>(unit[i]);
+      samples[i] = finiteFloat((static_cast<double>(samples[i]) - static_cast<double>(spread[i])) / (u + v));
+      spread[i] = finiteFloat(static_cast<double>(spread[i]) / u);
+      if (follows) levels[i] = finiteFloat(v / (u + v));
     }
   });
-  noise = boxMean(noise, 1);
-  bias = boxMean(bias, kBiasRadius);
-  if (follows) level = boxMean(level, kBiasRadius);
-  Plane<float> out(width, height, kUnfilled);
+  const Plane<double> noise = boxMean(spread, 1), bias = boxMean(samples, kBiasRadius);
+  Plane<double> level;
+  if (follows) level = boxMean(levels, kBiasRadius);
+  Plane<float> out = std::move(samples);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const double ofHalves = std::max(0.0, bias[i]), v2 = follows ? 2 * level[i] : 0;
       const double share = follows ? v2 / std::max(v2 + 2 * noise[i] + ofHalves, 1e-300) : 1;
-      out[i] = finiteFloat(unit[i] * (noise[i] + share * ofHalves));
+      out[i] = finiteFloat(static_cast<double>(unit[i]) * (noise[i] + share * ofHalves));
     }
   });
   return out;
 }
 
 Plane<float> smoothedSquaredBias(const Plane<float>& squaredBias, const Rgb<float>& guide) {
-  const Plane<double> unit = relativeUnits(guide);
-  Plane<double> mean(guide.width(), guide.height());
-  for (size_t i = 0; i < mean.size(); ++i) mean[i] = static_cast<double>(squaredBias[i]) / unit[i];
-  mean = boxMean(mean, kBiasRadius);
-  Plane<float> out(guide.width(), guide.height());
-  for (size_t i = 0; i < out.size(); ++i) out[i] = finiteFloat(unit[i] * std::max(0.0, mean[i]));
+  const Plane<float> unit = relativeUnits(guide);
+  Plane<float> relative(guide.width(), guide.height(), kUnfilled);
+  parallelChunks(unit.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i)
+      relative[i] = finiteFloat(static_cast<double>(squaredBias[i]) / static_cast<double>(unit[i]));
+  });
+  const Plane<double> mean = boxMean(relative, kBiasRadius);
+  Plane<float> out = std::move(relative);
+  parallelChunks(unit.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) out[i] = finiteFloat(static_cast<double>(unit[i]) * std::max(0.0, mean[i]));
+  });
   return out;
 }
 

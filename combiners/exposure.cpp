@@ -62,6 +62,21 @@ bool onlyMultiplied(const float* in, size_t count, const Change& change, float* 
   return good != 0;
 }
 
+// Whether all values are within the range of a change.
+bool within(const Plane<float>& in, const Change& change) {
+  return parallelSum(in.size(), kPixelChunk, 0, [&](size_t begin, size_t end) {
+           int bad = 0;
+           for (size_t i = begin; i < end; ++i)
+             bad |=
+                 static_cast<int>(!(in[i] >= change.lowest)) | static_cast<int>(!(std::fabs(in[i]) <= change.largest));
+           return bad;
+         }) == 0;
+}
+
+bool within(const Rgb<float>& in, const Change& change) {
+  return within(in[0], change) && within(in[1], change) && within(in[2], change);
+}
+
 Plane<float> changed(const Plane<float>& in, const Change& change, SanitiseReport& report) {
   Plane<float> out(in.width, in.height, kUnfilled);
   report += parallelSum(in.size(), kPixelChunk, SanitiseReport{}, [&](size_t begin, size_t end) {
@@ -90,6 +105,13 @@ FeaturePlanes<P> changed(const FeaturePlanes<P>& in, bool noise, SanitiseReport&
   for (size_t h = 0; h < 2; ++h) out.half[h] = changed(in.half[h], colours(1), report);
   out.variance = changed(in.variance, variances(1), report);
   return out;
+}
+
+template <class P>
+bool isSane(const FeaturePlanes<P>& in, bool noise) {
+  if (!within(in.mean, colours(1))) return false;
+  return !noise ||
+         (within(in.half[0], colours(1)) && within(in.half[1], colours(1)) && within(in.variance, variances(1)));
 }
 
 Checkpoint changed(const Checkpoint& in, double k, SanitiseReport& report) {
@@ -162,6 +184,10 @@ Estimates normalised(const Estimates& all, double k, SanitiseReport& report, con
   features.depth = changed(all.features->depth, read.featureNoise, report);
   features.visibility = changed(all.features->visibility, read.featureNoise, report);
   return out;
+}
+
+bool isSane(const Features& f, bool noise) {
+  return isSane(f.albedo, noise) && isSane(f.normal, noise) && isSane(f.depth, noise) && isSane(f.visibility, noise);
 }
 
 void undoExposure(MethodResult& result, double k) {

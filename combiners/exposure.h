@@ -42,6 +42,9 @@ struct PlanesRead {
 Estimates normalised(const Estimates& estimates, double k, SanitiseReport& report, const PlanesRead& read = {});
 Estimate normalised(const Estimate& estimate, double k, SanitiseReport& report, bool quarters = true);
 
+// Whether methods may see features, or only their means, as they are: nothing of them would be changed.
+bool isSane(const Features& features, bool noise);
+
 // Back to the units of the estimates: colours and biases are divided by k, variances and squared errors by k².
 void undoExposure(MethodResult& result, double k);
 

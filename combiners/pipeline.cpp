@@ -59,7 +59,8 @@ class Runner {
   void normalise(const Estimates& estimates, const Recipe& recipe);
   // Makes estimates of the earlier images that steps read.
   void keepEarlier(const Recipe& recipe);
-  void run(Step step);
+  // The last step may change what it reads.
+  void run(Step step, bool last);
   // Back to the units of the estimates.
   void finish();
 
@@ -74,6 +75,7 @@ class Runner {
   using Earlier = std::pair<std::string, uint64_t>;  // name, passes
 
   Estimates all_;                        // normalised; so are the results until finish()
+  const Features* features_ = nullptr;   // the given ones, if they are fit as they are
   std::map<Earlier, Estimate> earlier_;  // images of checkpoints
   const PipelineOptions& options_;
 };
@@ -84,7 +86,11 @@ void Runner::normalise(const Estimates& estimates, const Recipe& recipe) {
     if (unbiased.empty()) unbiased = step.unbiased;
   const Estimate* e = estimates.find(unbiased);
   result.exposure = options_.exposure > 0 ? options_.exposure : e ? exposureScale(e->mean) : 1.0;
-  all_ = normalised(estimates, result.exposure, result.sanitised, planesRead(recipe));
+  PlanesRead read = planesRead(recipe);
+  const bool fit = read.features && estimates.features && isSane(*estimates.features, read.featureNoise);
+  read.features = read.features && !fit;
+  all_ = normalised(estimates, result.exposure, result.sanitised, read);
+  features_ = fit ? &*estimates.features : all_.features ? &*all_.features : nullptr;
 }
 
 void Runner::keepEarlier(const Recipe& recipe) {
@@ -132,7 +138,7 @@ MethodInputs Runner::inputsOf(const Step& step) const {
   in.biased = estimate(step.biased);
   in.correlated = estimate(step.correlated);
   for (const std::string& base : step.bases) in.bases.push_back(estimate(base));
-  in.features = all_.features ? &*all_.features : nullptr;
+  in.features = features_;
   const auto history = all_.history.find(step.unbiased);
   in.history = history == all_.history.end() ? nullptr : &history->second;
   in.seed = all_.seed;
@@ -173,11 +179,14 @@ double Runner::inputSeconds(const Step& step) const {
   return seconds;
 }
 
-void Runner::run(Step step) {
+void Runner::run(Step step, bool last) {
   PipelineOutput out;
   if (step.obstacle.empty()) step.obstacle = missingInput(step);
   if (step.obstacle.empty()) {
-    const MethodInputs in = inputsOf(step);
+    MethodInputs in = inputsOf(step);
+    for (Estimate& e : all_.estimates)
+      if (last && &e == in.unbiased) in.expendable = &e;
+    const double unbiasedMean = meanOf(in.unbiased->mean);
     const Stopwatch clock;
     try {
       cancellable(in.cancel, [&] { out.result = step.method->run(in); });
@@ -185,7 +194,7 @@ void Runner::run(Step step) {
       step.obstacle = e.what();
     }
     out.seconds = clock.seconds();
-    out.meanOverUnbiased = meanOf(out.result.image.mean) / meanOf(in.unbiased->mean);
+    out.meanOverUnbiased = meanOf(out.result.image.mean) / unbiasedMean;
     out.inputSeconds = inputSeconds(step);
     const Estimate* unbiased = in.unbiased;
     Estimate& image = out.result.image;
@@ -241,7 +250,7 @@ PipelineResult runPipeline(const Estimates& estimates, const std::vector<std::st
   runner.keepEarlier(recipe);
   for (const Step& step : recipe.steps) {
     if (options.cancel && options.cancel->load()) break;
-    runner.run(step);
+    runner.run(step, &step == &recipe.steps.back());
   }
   runner.finish();
   return std::move(runner.result);

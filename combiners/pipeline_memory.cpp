@@ -54,8 +54,8 @@ int colourMemory(const Facts& facts) {
   return bytes;
 }
 
-// With the mean, two halves and the variance, or the mean alone.
-int featureMemory(bool noise) { return (noise ? 4 : 1) * kFeatureComponents * static_cast<int>(sizeof(float)); }
+// With the mean, two halves and the variance.
+constexpr int kFeatureMemory = 4 * kFeatureComponents * static_cast<int>(sizeof(float));
 
 Facts copiedFacts(Facts facts, const PlanesRead& read) {
   for (EstimateFacts& e : facts.estimates) {
@@ -64,18 +64,16 @@ Facts copiedFacts(Facts facts, const PlanesRead& read) {
     e.checkpoints = 0;
     e.kept.clear();
   }
-  facts.features &= read.features;
   return facts;
 }
 
 }  // namespace
 
-int estimatesMemory(const Facts& facts) { return colourMemory(facts) + (facts.features ? featureMemory(true) : 0); }
+int estimatesMemory(const Facts& facts) { return colourMemory(facts) + (facts.features ? kFeatureMemory : 0); }
 
 uint64_t pipelineMemory(const Recipe& recipe, const Facts& given, uint64_t pixels, int threads) {
-  const PlanesRead read = planesRead(recipe);
-  const Facts facts = copiedFacts(given, read);
-  const int copy = colourMemory(facts) + (facts.features ? featureMemory(read.featureNoise) : 0);
+  const Facts facts = copiedFacts(given, planesRead(recipe));
+  const int copy = colourMemory(facts);  // features are read as they are, unless they have bad values
   uint64_t kept = 0, peak = 0;  // bytes
   for (const Step& step : recipe.steps) {
     if (!step.obstacle.empty()) continue;

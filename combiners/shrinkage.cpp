@@ -26,12 +26,13 @@ void forAll(size_t count, const Body& body) {
 
 // Combines values of the mirrored window along x, then along y, one by one.
 template <class Combine>
-Plane<double> separable(const Plane<double>& in, int radius, const Combine& combine) {
+Plane<double> separable(const Plane<float>& in, int radius, const Combine& combine) {
   Plane<double> rows(in.width, in.height), out(in.width, in.height);
   parallelRows(in.height, [&](int y) {
     for (int x = 0; x < in.width; ++x) {
       double sum = 0;
-      for (int d = -radius; d <= radius; ++d) sum = combine(sum, in.at(mirrorIndex(x + d, in.width), y), d);
+      for (int d = -radius; d <= radius; ++d)
+        sum = combine(sum, static_cast<double>(in.at(mirrorIndex(x + d, in.width), y)), d);
       rows.at(x, y) = sum;
     }
   });
@@ -45,7 +46,7 @@ Plane<double> separable(const Plane<double>& in, int radius, const Combine& comb
   return out;
 }
 
-Plane<double> gaussianMean(const Plane<double>& in, int radius, double sigma) {
+Plane<double> gaussianMean(const Plane<float>& in, int radius, double sigma) {
   std::vector<double> weights(static_cast<size_t>(2 * radius + 1));
   double total = 0;
   for (int d = -radius; d <= radius; ++d)
@@ -56,7 +57,7 @@ Plane<double> gaussianMean(const Plane<double>& in, int radius, double sigma) {
 }
 
 // What is subtracted from SSE, before the constant: (p - 2) sigma², or its robust counterpart.
-Plane<double> numerators(const Plane<double>& variance, const JamesSteinSettings& s) {
+Plane<double> numerators(const Plane<float>& variance, const JamesSteinSettings& s) {
   const double p = (2.0 * s.radius + 1) * (2.0 * s.radius + 1);
   Plane<double> out = s.filter == VarianceFilter::Gaussian ? gaussianMean(variance, s.radius, std::max(s.sigma, 1e-3))
                                                            : mirrorBoxMean(variance, s.radius);
@@ -80,63 +81,81 @@ Plane<float> inverseUnits(const Plane<float>& variance) {
   return out;
 }
 
-double total(const Plane<double>& in) {
+double total(const Plane<float>& in) {
   return parallelSum(in.size(), kPixelChunk, 0.0, [&](size_t begin, size_t end) {
     double sum = 0;
-    for (size_t i = begin; i < end; ++i) sum += in[i];
+    for (size_t i = begin; i < end; ++i) sum += static_cast<double>(in[i]);
     return sum;
   });
 }
 
+// The squared differences of X and Y and the variance of X, in units of the scale: what the factors are made of.
+struct Terms {
+  Plane<float> squares, noise;
+};
+
 // The mean factor of every pixel of one channel; those of blocks are not below `least`, if any.
-Plane<double> factors(const Plane<double>& squares, const Plane<double>& variance, const JamesSteinSettings& s,
-                      const Plane<double>* least) {
+Plane<double> factors(Terms terms, const JamesSteinSettings& s, const Plane<double>* least) {
   if (s.global) {
-    const auto n = static_cast<double>(squares.size());
-    const double numerator = s.constant * std::max(0.0, n - 2) / n * total(variance);
-    return {squares.width, squares.height, shrinkageFactor(numerator, total(squares), s.positivePart)};
+    const auto n = static_cast<double>(terms.squares.size());
+    const double numerator = s.constant * std::max(0.0, n - 2) / n * total(terms.noise);
+    return {terms.squares.width, terms.squares.height,
+            shrinkageFactor(numerator, total(terms.squares), s.positivePart)};
   }
   const double p = (2.0 * s.radius + 1) * (2.0 * s.radius + 1);
-  const Plane<double> numerator = numerators(variance, s);
-  Plane<double> factor = mirrorBoxMean(squares, s.radius);
+  Plane<double> numerator = numerators(terms.noise, s);
+  terms.noise = {};  // no more memory at once than is needed: the first touch of new memory takes longer than the loop
+  Plane<double> factor = mirrorBoxMean(terms.squares, s.radius);
+  terms.squares = {};
   forAll(factor.size(),
          [&](size_t i) { factor[i] = shrinkageFactor(s.constant * numerator[i], p * factor[i], s.positivePart); });
+  numerator = {};
   if (least) forAll(factor.size(), [&](size_t i) { factor[i] = std::max(factor[i], (*least)[i]); });
   return mirrorBoxMean(factor, s.radius);
 }
 
-// The squared differences of X and Y and the variance of X, in units of the scale: what the factors are made of.
-struct Terms {
-  Plane<double> squares, noise;
+struct TermRows {
+  std::array<const float*, 3> x, y, variance, inverseUnit;
 };
 
-// squares += weight max(d², rounding) / unit and noise += weight variance / unit of one channel; unit is 1 for null.
-void addTerms(const float* __restrict x, const float* __restrict y, const float* __restrict variance,
-              const float* __restrict inverseUnit, double weight, size_t count, double* __restrict squares,
-              double* __restrict noise) {
+// The means over the channels of max(d², rounding) / unit and of variance / unit; without units they are 1.
+template <size_t kChannels, bool kUnits>
+void termsOfRow(const TermRows& in, size_t count, float* __restrict squares, float* __restrict noise) {
   for (size_t i = 0; i < count; ++i) {
-    const double inverse = weight * (inverseUnit ? static_cast<double>(inverseUnit[i]) : 1.0);
-    const auto value = static_cast<double>(x[i]), difference = value - static_cast<double>(y[i]);
-    squares[i] += inverse * std::max(difference * difference, kRelativeLeast * value * value);
-    noise[i] += inverse * static_cast<double>(variance[i]);
+    double square = 0, variance = 0;
+    for (size_t c = 0; c < kChannels; ++c) {
+      const double inverse = kUnits ? static_cast<double>(in.inverseUnit[c][i]) : 1.0;
+      const auto value = static_cast<double>(in.x[c][i]), difference = value - static_cast<double>(in.y[c][i]);
+      square += inverse * std::max(difference * difference, kRelativeLeast * value * value);
+      variance += inverse * static_cast<double>(in.variance[c][i]);
+    }
+    squares[i] = finiteFloat(square / kChannels);
+    noise[i] = finiteFloat(variance / kChannels);
   }
+}
+
+void termsOfRow(const TermRows& in, size_t channels, size_t count, float* squares, float* noise) {
+  const bool units = in.inverseUnit[0] != nullptr;
+  if (channels == 3)
+    units ? termsOfRow<3, true>(in, count, squares, noise) : termsOfRow<3, false>(in, count, squares, noise);
+  else
+    units ? termsOfRow<1, true>(in, count, squares, noise) : termsOfRow<1, false>(in, count, squares, noise);
 }
 
 // Of the channels [first, first + together), averaged; nothing of gated pixels.
 Terms termsOf(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale& scale, const Rgb<float>& y,
               size_t first, size_t together) {
-  Terms out{Plane<double>(x.width(), x.height(), kUnfilled), Plane<double>(x.width(), x.height(), kUnfilled)};
-  const double weight = 1.0 / static_cast<double>(together);
+  Terms out{Plane<float>(x.width(), x.height(), kUnfilled), Plane<float>(x.width(), x.height(), kUnfilled)};
   parallelChunks(x.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    std::fill_n(&out.squares[begin], end - begin, 0.0);
-    std::fill_n(&out.noise[begin], end - begin, 0.0);
-    for (size_t c = first; c < first + together; ++c) {
-      const float* unit = scale.inverseUnit[c].empty() ? nullptr : &scale.inverseUnit[c][begin];
-      runVectorised([&] {
-        addTerms(&x[c][begin], &y[c][begin], &variance[c][begin], unit, weight, end - begin, &out.squares[begin],
-                 &out.noise[begin]);
-      });
+    TermRows rows{};
+    for (size_t c = 0; c < together; ++c) {
+      const auto at = [&](const Plane<float>& plane) { return plane.empty() ? nullptr : &plane[begin]; };
+      rows.x[c] = at(x[first + c]);
+      rows.y[c] = at(y[first + c]);
+      rows.variance[c] = at(variance[first + c]);
+      rows.inverseUnit[c] = at(scale.inverseUnit[first + c]);
     }
+    runVectorised([&] { termsOfRow(rows, together, end - begin, &out.squares[begin], &out.noise[begin]); });
     for (size_t i = begin; i < end; ++i)
       if (isLoneOutlier(scale.gate, x, y, i)) out.squares[i] = out.noise[i] = 0;
   });
@@ -223,8 +242,8 @@ ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const No
   out.image = Rgb<float>(x.width(), x.height(), kUnfilled);
   const size_t together = settings.shared ? 3 : 1;
   for (size_t first = 0; first < 3; first += together) {
-    const Terms terms = termsOf(x, variance, scale, y, first, together);
-    Plane<double> factor = factors(terms.squares, terms.noise, settings, least ? &(*least)[first] : nullptr);
+    Plane<double> factor =
+        factors(termsOf(x, variance, scale, y, first, together), settings, least ? &(*least)[first] : nullptr);
     parallelChunks(x.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i)
         if (isLoneOutlier(scale.gate, x, y, i)) factor[i] = 0;

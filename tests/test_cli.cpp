@@ -104,14 +104,14 @@ TEST_CASE("A photon map comes with its bias, and with an error map of variance a
   const Folder folder;
   const ImageFile file = rendered(folder, "--integrator sppm --spp 8");
   const std::set<std::string> names = channels(file);
-  for (const char* layer : {"sppm.mean.R", "sppm.bias.R", "sppm.biasVariance.R", "Error.R"})
+  for (const char* layer : {"sppm.mean.R", "sppm.bias.R", "sppm.biasVariance.R", "Error.Y"})
     CHECK_MESSAGE(names.count(layer), layer);
   Estimate estimate;
   estimate.mean = file.rgb("sppm.mean");
   estimate.variance = file.rgb("sppm.variance");
   estimate.bias = file.rgb("sppm.bias");
   estimate.biasVariance = file.rgb("sppm.biasVariance");
-  CHECK(file.planes.at("Error.R").data == errorMap(estimate).data);
+  CHECK(file.planes.at("Error.Y").data == errorMap(estimate).data);
 }
 
 TEST_CASE("Options choose what is written") {

@@ -110,7 +110,7 @@ TEST_CASE("statistics survive a file bit for bit, under the documented names") {
   const Rgb<float> error = colour(37, 133, 1e-12f);
   ExrOptions options;
   options.quarters = true;
-  options.layers = {{"Error", &error}};
+  options.layers = {{"combined.js", &error}, {"Error", nullptr, &error[1]}};
   writeExr(path, all, all.estimates[0].mean, nullptr, options);
   const ImageFile f = readImage(path);
   CHECK((f.width == 37 && f.height == 133));
@@ -121,7 +121,9 @@ TEST_CASE("statistics survive a file bit for bit, under the documented names") {
     CHECK(same(f.rgb(e.name + ".variance"), e.variance));
   }
   CHECK(same(f.rgb("pt.q3"), all.estimates[0].quarter[3]));
-  CHECK(same(f.rgb("Error"), error));
+  CHECK(same(f.rgb("combined.js"), error));
+  CHECK(f.planes.at("Error.Y").data == error[1].data);
+  CHECK(f.rgb("Error")[2].data == error[1].data);
   CHECK(same(f.rgb("Albedo"), all.features->albedo.mean));
   CHECK(same(f.rgb("AlbedoB"), all.features->albedo.half[1]));
   CHECK(same(f.rgb("AlbedoVariance"), all.features->albedo.variance));
@@ -136,7 +138,7 @@ TEST_CASE("statistics survive a file bit for bit, under the documented names") {
   CHECK(same(f.planes.at("VisibilityVariance.V"), all.features->visibility.variance));
   // The headline is half: 11 bits.
   CHECK(f.rgb()[0].at(3, 4) == doctest::Approx(all.estimates[0].mean[0].at(3, 4)).epsilon(1.0 / 2048));
-  CHECK(f.channelNames.size() == 3 + 2 * 12 + 12 + 3 + 4 * (3 + 3 + 1 + 1));
+  CHECK(f.channelNames.size() == 3 + 2 * 12 + 12 + 3 + 1 + 4 * (3 + 3 + 1 + 1));
   CHECK(folder.count() == 1);
 }
 

@@ -328,7 +328,7 @@ TEST_CASE("render --tev shows what it saves, and no viewer changes a pixel") {
       CHECK(std::ranges::equal(v.images.at(std::string("cornell.glb: ") + view).channels.at(channel), plane.data));
     }
   CHECK(
-      std::ranges::equal(v.images.at("cornell.glb: combined").channels.at("Error.Y"), saved.planes.at("Error.R").data));
+      std::ranges::equal(v.images.at("cornell.glb: combined").channels.at("Error.Y"), saved.planes.at("Error.Y").data));
 }
 
 TEST_CASE("A viewer that vanishes in the middle of a render ends nothing") {

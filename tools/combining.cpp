@@ -165,42 +165,32 @@ CombinedLayers::CombinedLayers(const PipelineResult& result, const std::vector<s
       estimates.estimates.push_back(std::move(e));
     }
     if (weights)
-      for (const NamedPlane& p : out.result.aovs) add(p.name, p.plane);
+      for (const NamedPlane& p : out.result.aovs) add(p.name, nullptr, &p.plane);
   }
   for (const std::string& name : wanted) {
     const PipelineOutput* out = result.find(name);
     if (!out || !out->ran()) continue;
     last = out;
-    const std::string layer = "combined." + layerName(name);
-    if (std::none_of(list_.begin(), list_.end(), [&](const Layer& l) { return l.name == layer; }))
-      list_.push_back({layer, &out->result.image.mean, nullptr});
+    add("combined." + layerName(name), &out->result.image.mean, nullptr);
   }
   if (!last) {
     // An integrator is the headline: if it is biased and knows by how much, its error is more than its variance.
-    if (!estimates.estimates.empty() && !estimates.estimates.front().bias.empty())
-      add("Error", errorMap(estimates.estimates.front()));
+    if (!estimates.estimates.empty() && !estimates.estimates.front().bias.empty()) {
+      integratorsError_ = errorMap(estimates.estimates.front());
+      add("Error", nullptr, &integratorsError_);
+    }
     return;
   }
   headline_ = &last->result.image.mean;
-  if (!last->result.error.empty()) add("Error", last->result.error);
+  if (!last->result.error.empty()) add("Error", nullptr, &last->result.error);
   estimates.attributes.push_back(
       {"braid/headline", Attribute::Kind::String, "combined." + layerName(last->step.name), 0, 0, {}});
   estimates.attributes.push_back({"braid/exposure", Attribute::Kind::Float, "", 0, result.exposure, {}});
 }
 
-void CombinedLayers::add(const std::string& name, const Plane<float>& plane) {
-  for (const Layer& l : list_)
-    if (l.name == name) return;
-  auto image = std::make_unique<Rgb<float>>();
-  for (Plane<float>& p : image->channel) p = plane;
-  const Rgb<float>* pointer = image.get();
-  list_.push_back({name, pointer, std::move(image)});
-}
-
-std::vector<ExrLayer> CombinedLayers::layers() const {
-  std::vector<ExrLayer> layers;
-  for (const Layer& l : list_) layers.push_back({l.name, l.image});
-  return layers;
+void CombinedLayers::add(const std::string& name, const Rgb<float>* image, const Plane<float>* plane) {
+  if (std::none_of(list_.begin(), list_.end(), [&](const ExrLayer& l) { return l.name == name; }))
+    list_.push_back({name, image, plane});
 }
 
 std::vector<std::string> combineWarnings(const PipelineResult& result) {

@@ -59,19 +59,15 @@ class CombinedLayers {
   CombinedLayers(const PipelineResult& result, const std::vector<std::string>& wanted, bool weights, bool timing,
                  Estimates& estimates);
   // combined.<method>, Error and the weights.
-  std::vector<ExrLayer> layers() const;
+  const std::vector<ExrLayer>& layers() const { return list_; }
   // The image of the last wanted method that ran; null: none did.
   const Rgb<float>* headline() const { return headline_; }
 
  private:
-  struct Layer {
-    std::string name;
-    const Rgb<float>* image = nullptr;
-    std::unique_ptr<Rgb<float>> owned;
-  };
-  void add(const std::string& name, const Plane<float>& plane);
+  void add(const std::string& name, const Rgb<float>* image, const Plane<float>* plane);
 
-  std::vector<Layer> list_;
+  std::vector<ExrLayer> list_;
+  Plane<float> integratorsError_;
   const Rgb<float>* headline_ = nullptr;
 };
 

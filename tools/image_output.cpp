@@ -119,7 +119,8 @@ WrittenImage writeImage(const ImageOutput& o, Estimates& estimates, const Plane<
     if (o.show) showImages(estimates, combined, wanted, o.show);
     const Stopwatch writing;
     written.error = headlineError(combined, wanted, estimates);
-    const Rgb<float> first = estimates.estimates.front().mean;
+    // CombinedLayers may move the estimates.
+    const Rgb<float> first = headlineOf(combined, wanted) ? Rgb<float>() : estimates.estimates.front().mean;
     const CombinedLayers layers(combined, wanted, o.combine.weights, !o.noTiming, estimates);
     const Rgb<float>& headline = layers.headline() ? *layers.headline() : first;
     ExrOptions exr;

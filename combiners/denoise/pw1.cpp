@@ -31,9 +31,10 @@ class PatchWelchFirstOrder : public Method {
     FirstOrderOptions options;
     options.threshold = thresholdOf(in, kThreshold);
     options.stride = static_cast<int>(std::clamp(in.options.number(kStride), 1.0, 1.0 * PatchWelchNeighbours().outer));
-    const auto zeroOrder = patchWelch(input, std::array{options.threshold}, {}, {}, in.cancel);
+    auto zeroOrder = patchWelch(input, std::array{options.threshold}, {}, {}, in.cancel);
     RegressionReport report;
-    MethodResult result = patchWelchResult(patchWelchFirstOrder(input, zeroOrder[0], options, in.cancel, &report));
+    MethodResult result =
+        patchWelchResult(patchWelchFirstOrder(input, std::move(zeroOrder[0]), options, in.cancel, &report));
     result.remarks = {numberAttribute(kThreshold.name, options.threshold),
                       numberAttribute(kStride.name, options.stride), report.attribute("pw1-regression")};
     return result;

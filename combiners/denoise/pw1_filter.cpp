@@ -104,6 +104,12 @@ void squaredDifferences(const std::vector<std::array<Bordered, 3>>& radiance, co
   }
 }
 
+// The window and the pixel around it, from its first pixel on, of a plane with this pitch. Rows of a fixed length are
+// copied without a call.
+void copyWindow(const float* from, ptrdiff_t pitch, Bordered& to) {
+  for (int row = 0; row < kPitch; ++row) std::memcpy(to.v + row * kPitch, from + row * pitch, kPitch * sizeof(float));
+}
+
 void addCounts(const float* __restrict inside, float* __restrict count) {
   for (int i = 0; i < kCount; ++i) count[i] += inside[i];
 }
@@ -216,16 +222,16 @@ class TileRegression {
   // Of the fits whose centres lie in the tile.
   RegressionReport report;
 
-  // Blends with the zero-order results.
-  void write(const std::vector<Rgb<float>>& zeroOrder, float kappa, std::vector<Rgb<float>>& out) const {
-    for (size_t k = 0; k < out.size(); ++k)
+  // Blends with the zero-order results, which are in `images`.
+  void blendInto(std::vector<Rgb<float>>& images, float kappa) const {
+    for (size_t k = 0; k < images.size(); ++k)
       for (size_t c = 0; c < 3; ++c)
         for (int y = target_.y0; y < target_.y1; ++y)
           for (int x = target_.x0; x < target_.x1; ++x) {
             const auto at = static_cast<size_t>(sumIndex(x, y));
             const float a = tile_.divisor[c][static_cast<size_t>(tile_.index(x, y))];
-            out[k][c].at(x, y) =
-                (a * sums_[k][1 + c][at] + kappa * zeroOrder[k][c].at(x, y)) / (sums_[k][0][at] + kappa);
+            float& image = images[k][c].at(x, y);
+            image = (a * sums_[k][1 + c][at] + kappa * image) / (sums_[k][0][at] + kappa);
           }
   }
 
@@ -240,7 +246,8 @@ class TileRegression {
     const PixelRect window = grown({x, y, x + 1, y + 1}, kRadius + 1), pixels = intersection(window, image_);
     clipped_ = pixels.width() < kPitch || pixels.height() < kPitch;
     const auto copy = [&](const PixelBuffer<float>& from, Bordered& to) {
-      if (clipped_) std::fill_n(to.v, kBorderedSize, 0.0f);
+      if (!clipped_) return copyWindow(from.data() + tile_.index(window.x0, window.y0), tile_.pitch, to);
+      std::fill_n(to.v, kBorderedSize, 0.0f);
       for (int row = pixels.y0; row < pixels.y1; ++row)
         std::memcpy(to.v + (row - window.y0) * kPitch + (pixels.x0 - window.x0),
                     from.data() + tile_.index(pixels.x0, row), static_cast<size_t>(pixels.width()) * sizeof(float));
@@ -348,23 +355,22 @@ class TileRegression {
 
 }  // namespace
 
-std::vector<Rgb<float>> patchWelchFirstOrder(const PatchWelchInput& input, const std::vector<Rgb<float>>& zeroOrder,
+std::vector<Rgb<float>> patchWelchFirstOrder(const PatchWelchInput& input, std::vector<Rgb<float>> zeroOrder,
                                              const FirstOrderOptions& options, const std::atomic<bool>* cancel,
                                              RegressionReport* report) {
   BRAID_ASSERT((input.images.size() == 1 || input.images.size() == 3) && zeroOrder.size() == input.images.size() &&
                options.stride >= 1 && options.tileSize >= 1);
-  std::vector<Rgb<float>> out = unfilledImages(input);
   std::mutex reporting;
   forEachTile(input.width(), input.height(), options.tileSize, options.tileSize, [&](const PixelRect& tile) {
-    if (cancel && cancel->load(std::memory_order_relaxed)) return blacken(tile, out);
+    if (cancel && cancel->load(std::memory_order_relaxed)) return;
     const auto regression = std::make_unique<TileRegression>(input, options, tile);
     runVectorised([&] { regression->run(); });
-    regression->write(zeroOrder, options.kappa, out);
+    regression->blendInto(zeroOrder, options.kappa);
     if (!report) return;
     const std::lock_guard lock(reporting);
     *report += regression->report;
   });
-  return out;
+  return zeroOrder;
 }
 
 }  // namespace braid

@@ -24,9 +24,9 @@ struct FirstOrderOptions {
 };
 
 // Filters each image of `input` with its own weights; `zeroOrder` holds the results of patchWelch() with the same
-// threshold. Deterministic; the size of the tiles changes no bit. Once `cancel` is set, tiles stay black.
+// threshold. Deterministic; the size of the tiles changes no bit. Once `cancel` is set, tiles stay of zero order.
 // `report` gets the counts of the fits, of all images.
-std::vector<Rgb<float>> patchWelchFirstOrder(const PatchWelchInput& input, const std::vector<Rgb<float>>& zeroOrder,
+std::vector<Rgb<float>> patchWelchFirstOrder(const PatchWelchInput& input, std::vector<Rgb<float>> zeroOrder,
                                              const FirstOrderOptions& options = {},
                                              const std::atomic<bool>* cancel = nullptr,
                                              RegressionReport* report = nullptr);

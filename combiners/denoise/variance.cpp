@@ -19,17 +19,23 @@ float finiteVariance(float v) { return std::isfinite(v) && v > 0 ? v : 0.0f; }
 Plane<float> varianceFromHalves(const Plane<float>& a, const Plane<float>& b, uint64_t passes) {
   const double n = static_cast<double>(passes), countA = static_cast<double>((passes + 1) / 2);
   const auto factor = static_cast<float>(countA * (n - countA) / (n * n));
-  Plane<float> out(a.width, a.height);
-  for (size_t i = 0; i < out.size(); ++i) out[i] = finiteVariance(factor * (a[i] - b[i]) * (a[i] - b[i]));
+  Plane<float> out(a.width, a.height, kUnfilled);
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) out[i] = finiteVariance(factor * (a[i] - b[i]) * (a[i] - b[i]));
+  });
   return out;
 }
 
 // Shrinks `v` towards its box mean; `own` is the weight of the pixel's own value against the box's.
 void shrink(Plane<float>& v, double own, bool robust) {
-  Plane<float> values = v;
-  if (robust)
-    for (float& value : values.data) value = std::sqrt(std::sqrt(value));
-  const Plane<double> box = boxSum(values, kBoxRadius);
+  Plane<float> roots;
+  if (robust) {
+    roots = Plane<float>(v.width, v.height, kUnfilled);
+    parallelChunks(v.size(), kPixelChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) roots[i] = std::sqrt(std::sqrt(v[i]));
+    });
+  }
+  const Plane<double> box = boxSum(robust ? roots : v, kBoxRadius);
   parallelRows(v.height, [&](int y) {
     const int rows = patchCount(y, kBoxRadius, 0, v.height);
     for (int x = 0; x < v.width; ++x) {
@@ -54,8 +60,11 @@ Rgb<float> regularisedVariance(const Estimate& estimate, bool robust) {
     if (fromHalves) {
       out[c] = varianceFromHalves(estimate.half[0][c], estimate.half[1][c], n);
     } else {
-      out[c] = estimate.variance[c];
-      for (float& v : out[c].data) v = finiteVariance(v);
+      const Plane<float>& given = estimate.variance[c];
+      out[c] = Plane<float>(given.width, given.height, kUnfilled);
+      parallelChunks(given.size(), kPixelChunk, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end; ++i) out[c][i] = finiteVariance(given[i]);
+      });
     }
     shrink(out[c], fromHalves ? 0.0 : static_cast<double>(n - 1), robust);
   }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What filters over square windows share: tiles, the pixel pairs of an offset, a vectorisable exp2, and the choice of
-// the instruction set.
+// What filters over square windows share: tiles, the pixel pairs of an offset, and a vectorisable exp2.
 //
 // The fast order of a window filter on a processor with vector units is tile by tile, offset by offset, row by row: at
 // a fixed offset, neighbouring pixels do the same arithmetic on neighbouring data, and patch sums of differences are
@@ -16,6 +15,7 @@
 
 #include "renderer/core/parallel.h"
 #include "renderer/core/plane.h"
+#include "renderer/core/vectorised.h"
 
 namespace braid {
 
@@ -73,53 +73,6 @@ inline float exp2NonPositive(float x) {
   p = 0.240221092f + f * p;
   p = 1.0f + f * (0.693147181f + f * p);
   return std::bit_cast<float>(std::bit_cast<int32_t>(p) + (std::bit_cast<int32_t>(shifted) << 23));
-}
-
-#if defined(__x86_64__) && defined(__GNUC__)
-#define BRAID_AVX512 "avx512f,avx512bw,avx512dq,avx512vl"
-#if defined(__clang__)
-#define BRAID_WIDE ""
-#else
-#define BRAID_WIDE ",prefer-vector-width=512"
-#endif
-template <class Body>
-__attribute__((target(BRAID_AVX512 BRAID_WIDE), flatten, noinline)) void runWithAvx512(const Body& b) {
-  b();
-}
-template <class Body>
-__attribute__((target("avx2"), flatten, noinline)) void runWithAvx2(const Body& b) {
-  b();
-}
-#undef BRAID_AVX512
-#undef BRAID_WIDE
-#endif
-
-// The instruction set that runVectorised() uses on this processor.
-enum class VectorLevel { Baseline, Avx2, Avx512 };
-inline VectorLevel vectorLevel() {
-#if defined(__x86_64__) && defined(__GNUC__)
-  static const VectorLevel level = [] {
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
-        __builtin_cpu_supports("avx512vl"))
-      return VectorLevel::Avx512;
-    return __builtin_cpu_supports("avx2") ? VectorLevel::Avx2 : VectorLevel::Baseline;
-  }();
-  return level;
-#else
-  return VectorLevel::Baseline;
-#endif
-}
-
-// Calls body() in the widest instruction set of this processor: everything that it calls and the compiler sees is
-// compiled for each. The results have the same bits in all of them as long as body() does nothing but float arithmetic
-// without contraction (-ffp-contract=off).
-template <class Body>
-void runVectorised(const Body& body) {
-#if defined(__x86_64__) && defined(__GNUC__)
-  if (vectorLevel() == VectorLevel::Avx512) return runWithAvx512(body);
-  if (vectorLevel() == VectorLevel::Avx2) return runWithAvx2(body);
-#endif
-  body();
 }
 
 }  // namespace braid

@@ -2,9 +2,9 @@
 // Sums over square windows in constant time a pixel, without subtractions: sums of non-negative values are exact zeros
 // or positive.
 //
-// A line is cut into blocks as long as a window; a window is the tail of one block plus the head of the next (van Herk
-// 1992, with sums in place of maxima), so two running sums that never forget are enough. Lines are summed along x as
-// they come and at once along y, a few blocks of rows at a time: all that is kept of them stays in the cache.
+// Rows are summed along x as they come and at once along y, a few blocks of rows at a time: all that is kept of them
+// stays in the cache. Blocks have as many rows as a window; a window is the tail of one block plus the head of the next
+// (van Herk 1992, with sums in place of maxima), so two running sums that never forget are enough.
 #pragma once
 
 #include <algorithm>
@@ -13,6 +13,8 @@
 
 #include "renderer/core/parallel.h"
 #include "renderer/core/plane.h"
+#include "renderer/core/vectorised.h"
+#include "renderer/core/window_sums.h"
 
 namespace braid {
 
@@ -39,9 +41,8 @@ class BoxSummer {
         length_(2 * radius + 1),
         before_(border == WindowBorder::Mirrored ? radius : 0),
         width_(in.width),
-        line_(roundedUp(in.width + 2 * before_ + radius)),
-        head_(line_.size()),
-        tail_(line_.size() + static_cast<size_t>(length_)),
+        line_(static_cast<size_t>(in.width + 2 * radius)),
+        spare_(line_.size()),
         rows_(static_cast<size_t>(length_ * in.width)),
         tails_(rows_.size()),
         heads_(static_cast<size_t>(in.width)) {}
@@ -66,7 +67,6 @@ class BoxSummer {
   }
 
  private:
-  size_t roundedUp(int count) const { return static_cast<size_t>((count + length_ - 1) / length_ * length_); }
   double* row(std::vector<double>& of, int j) { return of.data() + static_cast<ptrdiff_t>(j) * width_; }
 
   // The sums along x of the rows of a block.
@@ -84,26 +84,13 @@ class BoxSummer {
 
   void sumLine(int y, double* out) {
     const T* from = in_.data.data() + in_.index(0, y);
-    for (int x = 0; x < before_; ++x) {
-      line_[static_cast<size_t>(x)] = static_cast<double>(from[mirrorIndex(x - before_, width_)]);
-      line_[static_cast<size_t>(before_ + width_ + x)] = static_cast<double>(from[mirrorIndex(width_ + x, width_)]);
+    double* line = line_.data();
+    for (int x = 0; x < radius_; ++x) {
+      line[x] = before_ > 0 ? static_cast<double>(from[mirrorIndex(x - radius_, width_)]) : 0.0;
+      line[radius_ + width_ + x] = before_ > 0 ? static_cast<double>(from[mirrorIndex(width_ + x, width_)]) : 0.0;
     }
-    for (int x = 0; x < width_; ++x) line_[static_cast<size_t>(before_ + x)] = static_cast<double>(from[x]);
-    const auto length = static_cast<size_t>(length_);
-    for (size_t begin = 0; begin < line_.size(); begin += length) {
-      double head = 0, tail = 0;
-      for (size_t i = 0; i < length; ++i) {
-        head_[begin + i] = head += line_[begin + i];
-        tail_[begin + length - 1 - i] = tail += line_[begin + length - 1 - i];
-      }
-    }
-    // The window of x begins at first, of which the tail is empty where it is a whole block.
-    const int shift = before_ - radius_;
-    for (size_t begin = 0; begin < line_.size(); begin += length) tail_[begin] = 0;
-    for (int x = 0; x < width_; ++x) {
-      const int first = x + shift;
-      out[x] = (first < 0 ? 0.0 : tail_[static_cast<size_t>(first)]) + head_[static_cast<size_t>(first + length_ - 1)];
-    }
+    for (int x = 0; x < width_; ++x) line[radius_ + x] = static_cast<double>(from[x]);
+    windowSums(line, spare_.data(), width_, length_, out);
   }
 
   // tails_[j]: the sum of rows j and up of the block; row 0 is never asked for, as the whole block is all head then.
@@ -137,7 +124,7 @@ class BoxSummer {
 
   const Plane<T>& in_;
   const int radius_, length_, before_, width_;
-  std::vector<double> line_, head_, tail_;    // of a row, in whole blocks
+  std::vector<double> line_, spare_;          // of a row and what its windows hold beside it
   std::vector<double> rows_, tails_, heads_;  // of a block of rows
 };
 
@@ -151,7 +138,8 @@ Plane<double> boxSum(const Plane<T>& in, int radius, WindowBorder border = Windo
   const int blocks = box_sum_detail::BoxSummer<T>::blocks(in.height, radius, border),
             together = std::max(1, 64 / (2 * radius + 1));
   parallelChunks(static_cast<size_t>(blocks), static_cast<size_t>(together), [&](size_t begin, size_t end) {
-    box_sum_detail::BoxSummer<T>(in, radius, border).sum(static_cast<int>(begin), static_cast<int>(end), scale, out);
+    box_sum_detail::BoxSummer<T> summer(in, radius, border);
+    runVectorised([&] { summer.sum(static_cast<int>(begin), static_cast<int>(end), scale, out); });
   });
   return out;
 }

@@ -58,6 +58,7 @@ struct Needs {
 // The inputs of one method. Pointers that needs() does not ask for may be null. Widths and heights agree.
 struct MethodInputs {
   const Estimate* unbiased = nullptr;  // mean, halves, variance
+  Estimate* expendable = nullptr;      // the same, if nobody reads it afterwards: a method may change it
   const Estimate* biased = nullptr;    // mean, halves; variance and bias where known
   std::vector<const Estimate*> bases;
   const Estimate* correlated = nullptr;

@@ -111,8 +111,10 @@ std::vector<ExrChannel> namedPlanes(const Estimates& estimates, const Rgb<float>
       channels.add(e.name + ".halfB" + passes, kColour, c.half[1]);
     }
   }
-  for (const ExrLayer& layer : options.layers)
+  for (const ExrLayer& layer : options.layers) {
     if (layer.planes) channels.add(layer.name, kColour, *layer.planes);
+    if (layer.plane) channels.add(layer.name, "Y", *layer.plane);
+  }
   return channels.list();
 }
 

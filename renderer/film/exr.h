@@ -14,10 +14,12 @@ namespace braid {
 
 enum class AovSet { None, Features, All };
 
-// One more colour layer to write beside the estimates, such as "Error" or "combined.js".
+// One more layer to write beside the estimates: colours, such as "combined.js", or a single plane as channel Y, such as
+// "Error".
 struct ExrLayer {
   std::string name;
   const Rgb<float>* planes = nullptr;
+  const Plane<float>* plane = nullptr;
 };
 
 struct ExrOptions {
