@@ -319,6 +319,32 @@ TEST_CASE("An outlier in one quarter leaves nothing in its neighbours either") {
   CHECK(largest(kept) > 2);
 }
 
+TEST_CASE("Outliers are replaced in place where that is allowed, and nowhere else, with the same bits") {
+  Case c = noisyCase(64);
+  Estimate& x = *std::find_if(c.estimates.estimates.begin(), c.estimates.estimates.end(),
+                              [](const Estimate& e) { return e.name == "pt"; });
+  const size_t at = x.mean[0].index(40, 30);
+  for (size_t channel = 0; channel < 3; ++channel) {
+    x.mean[channel][at] += 50;
+    x.half[0][channel][at] += 100;
+    x.quarter[0][channel][at] += 200;
+    x.variance[channel][at] += 2500;
+  }
+  const auto method = findMethod("auto");
+  MethodInputs in;
+  in.unbiased = &x;
+  in.features = &*c.estimates.features;
+  const Estimate before = x;
+  const MethodResult copied = method->run(in);
+  CHECK(identical(x.mean, before.mean));
+  CHECK(identical(x.variance, before.variance));
+  in.expendable = &x;
+  const MethodResult inPlace = method->run(in);
+  CHECK(x.mean[0][at] < 25);
+  CHECK(identical(copied.image.mean, inPlace.image.mean));
+  CHECK(identical(copied.error, inPlace.error));
+}
+
 TEST_CASE("The rim of a lamp, darker than the lamp and noisier than all around it, stays as it is") {
   // The lamp's pixels are brighter, without noise and of another surface than the rim and the wall.
   Estimate x = flat(0.5f, 1e-8f);

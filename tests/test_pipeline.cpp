@@ -156,6 +156,23 @@ TEST_CASE("Normalised values beyond the range of methods are moved to its end") 
   CHECK(n.features->depth.mean[2] == 1e9f);
 }
 
+TEST_CASE("Features are read as they are unless something in them must be changed") {
+  const Features good = *makeCase(sized(8, 6)).estimates.features;
+  CHECK(isSane(good, false));
+  CHECK(isSane(good, true));
+  const auto bad = [&](auto change) {
+    Features f = good;
+    change(f);
+    return f;
+  };
+  for (const float value : {std::nanf(""), HUGE_VALF, 2e9f, -2e9f})
+    CHECK_FALSE(isSane(bad([&](Features& f) { f.normal.mean[1][5] = value; }), false));
+  const Features badHalf = bad([](Features& f) { f.depth.half[1][3] = std::nanf(""); });
+  CHECK(isSane(badHalf, false));
+  CHECK_FALSE(isSane(badHalf, true));
+  CHECK_FALSE(isSane(bad([](Features& f) { f.albedo.variance[0][7] = -1; }), true));
+}
+
 TEST_CASE("What no method reads is not copied") {
   const Estimates all = makeCase(sized(8, 6)).estimates;
   SanitiseReport report;
