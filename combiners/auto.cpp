@@ -68,7 +68,7 @@ Estimate asEstimate(std::vector<Rgb<float>> images, const char* name) {
 
 MethodMemory Auto::memory(const MemoryCase& of) const {
   const int fused = of.photonMaps > 0 ? 112 : 0, others = of.bases - of.photonMaps;
-  if (of.passes > 0 && of.passes < kFewestPasses) return {96 + fused + 36 * others, 36};
+  if (of.passes > 0 && of.passes < kFewestPasses) return {48 + fused + 36 * others, 36, 2'300'000};
   const int bases = others + 2;
   return {44 + 88 * bases + fused, 40 + 8 * bases};
 }

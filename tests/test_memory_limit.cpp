@@ -26,11 +26,14 @@ TEST_CASE("memory limits: sizes are read with their units") {
 
 TEST_CASE("memory limits: what the plan exceeds is refused before rendering, by name") {
   const Folder folder;
-  const Run run = braidRun(folder, "render " + kScene + "--size 4096x2160 --combine auto -o out.exr --memory-limit 1G");
-  CHECK(run.code == 5);
-  CHECK(run.err.find("for combining, and the limit is 1024 MiB: lower --size or raise --memory-limit") !=
-        std::string::npos);
-  CHECK(run.err.find('\n') == run.err.size() - 1);
+  for (const auto& [methods, most] : {std::pair("js@nfor", "combining"), {"auto", "film"}}) {
+    const Run run = braidRun(
+        folder, "render " + kScene + "--size 4096x2160 --combine " + methods + " -o out.exr --memory-limit 1G");
+    CHECK(run.code == 5);
+    CHECK(run.err.find(std::string("for ") + most +
+                       ", and the limit is 1024 MiB: lower --size or raise --memory-limit") != std::string::npos);
+    CHECK(run.err.find('\n') == run.err.size() - 1);
+  }
   CHECK_FALSE(std::filesystem::exists(folder.path / "out.exr"));
   // A limit from outside is the same.
   CHECK(

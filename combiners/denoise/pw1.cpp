@@ -23,7 +23,7 @@ class PatchWelchFirstOrder : public Method {
   }
   MethodKind kind() const override { return MethodKind::Denoiser; }
   Needs needs() const override { return patchWelchNeeds(); }
-  MethodMemory memory(const MemoryCase& /*of*/) const override { return {96, 36, 3'700'000}; }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {48, 36, 4'550'000}; }
   std::vector<OptionInfo> options() const override { return {kThreshold, kStride}; }
 
   MethodResult run(const MethodInputs& in) const override {

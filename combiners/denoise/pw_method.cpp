@@ -23,7 +23,7 @@ class PatchWelch : public Method {
   const char* description() const override { return description_.c_str(); }
   MethodKind kind() const override { return MethodKind::Denoiser; }
   Needs needs() const override { return patchWelchNeeds(); }
-  MethodMemory memory(const MemoryCase& /*of*/) const override { return {96, 36}; }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {48, 36, 2'300'000}; }
   std::vector<OptionInfo> options() const override { return {threshold_}; }
 
   MethodResult run(const MethodInputs& in) const override {
