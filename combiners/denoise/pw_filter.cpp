@@ -2,117 +2,17 @@
 #include "combiners/denoise/pw_filter.h"
 
 #include <cmath>
-#include <cstring>
 
+#include "combiners/denoise/pw_rows.h"
 #include "renderer/core/error.h"
 
 namespace braid {
 
 namespace {
 
-// Rows are computed in whole vectors; what is too much is never used.
-constexpr int kRowUnit = PatchWelchTile::kUnit;
-constexpr int wholeVectors(int n) { return roundUp(n, kRowUnit); }
 // The buffers of rows begin so many pixels left of the tile: all that a pair of it may reach.
 constexpr int kLead = kRowUnit;
 static_assert(kLead > PatchWelchNeighbours::kMostOuter);
-
-using Rows3 = std::array<const float*, 3>;
-
-Rows3 rowsAt(const PatchWelchTile::Plane3& planes, ptrdiff_t at) {
-  return {planes[0].data() + at, planes[1].data() + at, planes[2].data() + at};
-}
-
-// out_c = 1 / (V_p + V_q + eps)
-void inverseVarianceRow(const Rows3& p, const Rows3& q, int count, const std::array<float*, 3>& out) {
-  for (size_t c = 0; c < 3; ++c) {
-    const float* __restrict vp = p[c], * __restrict vq = q[c];
-    float* __restrict r = out[c];
-    for (int x = 0; x < count; ++x) r[x] = 1.0f / ((vp[x] + vq[x]) + kPatchWelchEpsilon);
-  }
-}
-
-// out = the sum over the channels of (u_p - u_q)² inverse_c
-void differenceRow(const Rows3& p, const Rows3& q, const Rows3& inverse, int count, float* __restrict out) {
-  const float* __restrict p0 = p[0], * __restrict p1 = p[1], * __restrict p2 = p[2];
-  const float* __restrict q0 = q[0], * __restrict q1 = q[1], * __restrict q2 = q[2];
-  const float* __restrict r0 = inverse[0], * __restrict r1 = inverse[1], * __restrict r2 = inverse[2];
-  for (int x = 0; x < count; ++x) {
-    const float d0 = p0[x] - q0[x], d1 = p1[x] - q1[x], d2 = p2[x] - q2[x];
-    out[x] = (d0 * d0 * r0[x] + d1 * d1 * r1[x]) + d2 * d2 * r2[x];
-  }
-}
-
-// out = the sum of the three values around each; of in[-1] on.
-void boxRow(const float* __restrict in, int count, float* __restrict out) {
-  const float* __restrict left = in - 1;
-  for (int x = 0; x < count; ++x) out[x] = (left[x] + left[x + 1]) + left[x + 2];
-}
-
-// out = max(0, 1 - s / t²) with s / t² = (a + b + c) inverseCount scale; whether any is positive. Not-a-number counts
-// as no.
-bool toleranceRow(const Rows3& rows, const float* __restrict inverseCount, float scale, int count,
-                  float* __restrict out) {
-  const float* __restrict a = rows[0], * __restrict b = rows[1], * __restrict c = rows[2];
-  int any = 0;
-  for (int x = 0; x < count; ++x) {
-    const float t = 1.0f - ((a[x] + b[x]) + c[x]) * (inverseCount[x] * scale);
-    out[x] = t > 0 ? t : 0.0f;
-    any |= t > 0;
-  }
-  return any != 0;
-}
-
-// out = 2^(spatial - |guide_p - guide_q|²)
-void edgeRow(const PatchWelchTile& tile, ptrdiff_t p, ptrdiff_t q, float spatial, int count, float* __restrict out) {
-  const auto& g = tile.guide;
-  const float* __restrict p0 = g[0].data() + p, * __restrict q0 = g[0].data() + q;
-  const float* __restrict p1 = g[1].data() + p, * __restrict q1 = g[1].data() + q;
-  const float* __restrict p2 = g[2].data() + p, * __restrict q2 = g[2].data() + q;
-  const float* __restrict p3 = g[3].data() + p, * __restrict q3 = g[3].data() + q;
-  const float* __restrict p4 = g[4].data() + p, * __restrict q4 = g[4].data() + q;
-  const float* __restrict p5 = g[5].data() + p, * __restrict q5 = g[5].data() + q;
-  for (int x = 0; x < count; ++x) {
-    const float d0 = p0[x] - q0[x], d1 = p1[x] - q1[x], d2 = p2[x] - q2[x];
-    const float d3 = p3[x] - q3[x], d4 = p4[x] - q4[x], d5 = p5[x] - q5[x];
-    const float albedo = (d0 * d0 + d1 * d1) + d2 * d2, normal = (d3 * d3 + d4 * d4) + d5 * d5;
-    out[x] = exp2NonPositive(spatial - (albedo + normal));
-  }
-}
-
-void weightRow(float* __restrict tolerance, const float* __restrict edge, int count) {
-  for (int x = 0; x < count; ++x) tolerance[x] = tolerance[x] * tolerance[x] * edge[x];
-}
-
-using Lanes = float __attribute__((vector_size(kRowUnit * sizeof(float))));
-
-// Sums of w and of w u for the pixels of a tile, row by row.
-struct Sums {
-  std::array<PixelBuffer<float>, 4> plane;  // weight, then red, green, blue
-};
-
-// A row of weights and of the pixels that they belong to.
-struct WeightedRow {
-  const float* w;
-  Rows3 u;
-};
-
-// Adds w and w u of all rows to the sums of a row of `count` pixels, a multiple of kRowUnit.
-void addRows(const std::vector<WeightedRow>& rows, int count, Sums& sums, ptrdiff_t at) {
-  for (int x = 0; x < count; x += kRowUnit) {
-    Lanes sum[4], w, u;
-    for (size_t k = 0; k < 4; ++k) std::memcpy(&sum[k], sums.plane[k].data() + at + x, sizeof(Lanes));
-    for (const WeightedRow& row : rows) {
-      std::memcpy(&w, row.w + x, sizeof(w));
-      sum[0] += w;
-      for (size_t c = 0; c < 3; ++c) {
-        std::memcpy(&u, row.u[c] + x, sizeof(u));
-        sum[1 + c] += w * u;
-      }
-    }
-    for (size_t k = 0; k < 4; ++k) std::memcpy(sums.plane[k].data() + at + x, &sum[k], sizeof(Lanes));
-  }
-}
 
 // The filter in one tile. The weight of a pair is the same seen from either pixel, hence only one of d and -d is
 // visited: each weight adds q to the sums of p and p to those of q. Pairs that reach into the tile from outside are
@@ -131,12 +31,11 @@ class TileFilter {
         images_(input.images.size()),
         columns_(static_cast<size_t>(2 * reach_ + 1)) {
     const PixelBuffer<float> zeros(static_cast<size_t>(kLead + wholeVectors(target_.width()) + 2 * kRowUnit), 0.0f);
-    inverse_.fill(zeros);
     for (Column& column : columns_) {
       for (auto& image : column.patchRows) image.fill(zeros);
       column.inverseCount = column.weight = column.edge = zeros;
     }
-    difference_ = zeros;
+    differences_.fill(zeros);
     ofFirst_.reserve(columns_.size());
     ofSecond_.reserve(columns_.size());
     startAtCentre();
@@ -162,7 +61,7 @@ class TileFilter {
       for (size_t i = 0; i < images_; ++i)
         for (size_t c = 0; c < 3; ++c)
           for (int y = target_.y0; y < target_.y1; ++y) {
-            const Sums& sums = sums_[k * images_ + i];
+            const WeightedSums& sums = sums_[k * images_ + i];
             const float* __restrict sum = sums.plane[1 + c].data() + sumIndex(target_.x0, y);
             const float* __restrict total = sums.plane[0].data() + sumIndex(target_.x0, y);
             const float* __restrict a = tile_.divisor[c].data() + tile_.index(target_.x0, y);
@@ -242,12 +141,12 @@ class TileFilter {
     const int x0 = position(std::max(p.x0 - 1, pairs.x0)), x1 = position(std::min(p.x1 + 1, pairs.x1));
     const int first = x0 / kRowUnit * kRowUnit, last = wholeVectors(x1);
     const ptrdiff_t at = tileIndex(first, y), to = tileIndex(first + dx, y + dy);
-    const std::array<float*, 3> inverse = {inverse_[0].data(), inverse_[1].data(), inverse_[2].data()};
-    inverseVarianceRow(rowsAt(tile_.variance, at), rowsAt(tile_.variance, to), last - first, inverse);
-    float* z2 = difference_.data();
+    std::array<float*, PatchWelchInput::kMaxImages> rows{};
+    for (size_t i = 0; i < images_; ++i) rows[i] = differences_[i].data() + first;
+    images_ == 3 ? differenceRows<3>(tile_, at, to, last - first, rows.data())
+                 : differenceRows<1>(tile_, at, to, last - first, rows.data());
     for (size_t i = 0; i < images_; ++i) {
-      differenceRow(rowsAt(tile_.radiance[i], at), rowsAt(tile_.radiance[i], to), {inverse[0], inverse[1], inverse[2]},
-                    last - first, z2 + first);
+      float* z2 = differences_[i].data();
       std::fill(z2 + std::max(first - 1, 0), z2 + x0, 0.0f);
       std::fill(z2 + x1, z2 + last + 1, 0.0f);
       boxRow(z2 + column.begin, count, column.patchRow(i, y));
@@ -264,7 +163,7 @@ class TileFilter {
         for (int dx = -reach_; dx <= reach_; ++dx)
           if (!columnOf(dx).p.empty() && weigh(columnOf(dx), y, dx, dy, i, thresholds_[k]))
             listRows(columnOf(dx), y, dx, dy, tile_.radiance[i]);
-        Sums& sums = sums_[k * images_ + i];
+        WeightedSums& sums = sums_[k * images_ + i];
         const int count = wholeVectors(target_.width());
         if (y >= target_.y0) addRows(ofFirst_, count, sums, sumIndex(target_.x0, y));
         if (y + dy < target_.y1) addRows(ofSecond_, count, sums, sumIndex(target_.x0, y + dy));
@@ -304,13 +203,26 @@ class TileFilter {
   int reach_;  // the largest distance in x and in y of a neighbour
   PatchWelchTile tile_;
   size_t images_;
-  std::vector<Sums> sums_;       // [threshold][image]
+  std::vector<WeightedSums> sums_;       // [threshold][image]
   std::vector<Column> columns_;  // by dx
   // Buffers of rows; see position().
-  std::array<PixelBuffer<float>, 3> inverse_;
-  PixelBuffer<float> difference_;
+  std::array<PixelBuffer<float>, PatchWelchInput::kMaxImages> differences_;
   std::vector<WeightedRow> ofFirst_, ofSecond_;  // what is added to the sums of p, and of q
 };
+
+// Images of the size of `input`, one for each of its images, whose pixels are still to be written.
+std::vector<Rgb<float>> unfilledImages(const PatchWelchInput& input) {
+  std::vector<Rgb<float>> images;
+  for (size_t i = 0; i < input.images.size(); ++i) images.emplace_back(input.width(), input.height(), kUnfilled);
+  return images;
+}
+
+// The pixels of a cancelled tile.
+void blacken(const PixelRect& tile, std::vector<Rgb<float>>& images) {
+  for (Rgb<float>& image : images)
+    for (Plane<float>& plane : image.channel)
+      for (int y = tile.y0; y < tile.y1; ++y) std::fill_n(&plane.at(tile.x0, y), tile.width(), 0.0f);
+}
 
 }  // namespace
 
@@ -342,18 +254,6 @@ float squaredThreshold(double z, uint64_t passes) {
   BRAID_ASSERT(passes >= 2);
   const double t = studentQuantile(z, 2 * passes - 2);
   return static_cast<float>(t * t);
-}
-
-std::vector<Rgb<float>> unfilledImages(const PatchWelchInput& input) {
-  std::vector<Rgb<float>> images;
-  for (size_t i = 0; i < input.images.size(); ++i) images.emplace_back(input.width(), input.height(), kUnfilled);
-  return images;
-}
-
-void blacken(const PixelRect& tile, std::vector<Rgb<float>>& images) {
-  for (Rgb<float>& image : images)
-    for (Plane<float>& plane : image.channel)
-      for (int y = tile.y0; y < tile.y1; ++y) std::fill_n(&plane.at(tile.x0, y), tile.width(), 0.0f);
 }
 
 std::vector<std::vector<Rgb<float>>> patchWelch(const PatchWelchInput& input, std::span<const double> thresholds,

@@ -50,11 +50,6 @@ struct TileSize {
   int width = 256, height = 32;
 };
 
-// Images of the size of `input`, one for each of its images, whose pixels are still to be written.
-std::vector<Rgb<float>> unfilledImages(const PatchWelchInput& input);
-// The pixels of a cancelled tile.
-void blacken(const PixelRect& tile, std::vector<Rgb<float>>& images);
-
 // Filters each image of `input` with its own weights, for each threshold, in one pass over the distances: result[k][i]
 // is images[i] with threshold z = thresholds[k], at least one. Deterministic; the size of the tiles changes no bit.
 // Once `cancel` is set, tiles stay black.
