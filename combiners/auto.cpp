@@ -90,12 +90,12 @@ std::vector<Estimate> filtersOf(const Estimate& x, const Features* features, con
           asEstimate(std::move(patchWelch(input, std::array{kPatchWelchThreshold}, {}, {}, cancel)[0]), "pw"));
       return bases;
     }
-    auto wide = std::move(patchWelch(input, std::array{kPatchWelchWideThreshold}, {}, {}, cancel)[0]);
-    if (cancelled()) return bases;
+    const bool firstOrder = x.passes >= kFirstOrderPasses;
     FirstOrderOptions fits;
     fits.stride = kFirstOrderStride;
-    const bool firstOrder = x.passes >= kFirstOrderPasses;
-    if (firstOrder) wide = patchWelchFirstOrder(input, std::move(wide), fits, cancel);
+    auto wide = firstOrder ? patchWelchFirstOrder(input, fits, cancel)
+                           : std::move(patchWelch(input, std::array{kPatchWelchWideThreshold}, {}, {}, cancel)[0]);
+    if (cancelled()) return bases;
     bases.push_back(asEstimate(std::move(wide), firstOrder ? "pw1" : "pw-wide"));
   }
   if (cancelled()) return bases;

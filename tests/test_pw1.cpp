@@ -25,7 +25,7 @@ Filtered filtered(const Estimate& e, const Features* features, FirstOrderOptions
   const PatchWelchInput input = patchWelchInput(e, features);
   Filtered out;
   out.zeroOrder = patchWelch(input, std::array{options.threshold})[0];
-  out.firstOrder = patchWelchFirstOrder(input, out.zeroOrder, options);
+  out.firstOrder = patchWelchFirstOrder(input, options);
   return out;
 }
 

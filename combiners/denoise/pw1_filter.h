@@ -23,11 +23,10 @@ struct FirstOrderOptions {
   int tileSize = 128;
 };
 
-// Filters each image of `input` with its own weights; `zeroOrder` holds the results of patchWelch() with the same
-// threshold. Deterministic; the size of the tiles changes no bit. Once `cancel` is set, tiles stay of zero order.
-// `report` gets the counts of the fits, of all images.
-std::vector<Rgb<float>> patchWelchFirstOrder(const PatchWelchInput& input, std::vector<Rgb<float>> zeroOrder,
-                                             const FirstOrderOptions& options = {},
+// Filters each image of `input` with its own weights, those of patchWelch() with the same threshold, whose results it
+// is blended with. Deterministic; the size of the tiles changes no bit. Once `cancel` is set, tiles stay of zero order,
+// or black. `report` gets the counts of the fits, of all images.
+std::vector<Rgb<float>> patchWelchFirstOrder(const PatchWelchInput& input, const FirstOrderOptions& options = {},
                                              const std::atomic<bool>* cancel = nullptr,
                                              RegressionReport* report = nullptr);
 

@@ -20,7 +20,7 @@ static_assert(kLead > PatchWelchNeighbours::kMostOuter);
 class TileFilter {
  public:
   TileFilter(const PatchWelchInput& input, const std::vector<float>& squaredThresholds,
-             const PatchWelchNeighbours& neighbours, const PixelRect& tile)
+             const PatchWelchNeighbours& neighbours, const PixelRect& tile, PatchWelchWeights* kept)
       : target_(tile),
         width_(input.width()),
         height_(input.height()),
@@ -29,6 +29,7 @@ class TileFilter {
         reach_(neighbours.outer),
         tile_(input, intersection(grown(tile, reach_ + 1), {0, 0, width_, height_}), tile.x0),
         images_(input.images.size()),
+        kept_(kept),
         columns_(static_cast<size_t>(2 * reach_ + 1)) {
     const PixelBuffer<float> zeros(static_cast<size_t>(kLead + wholeVectors(target_.width()) + 2 * kRowUnit), 0.0f);
     for (Column& column : columns_) {
@@ -161,8 +162,10 @@ class TileFilter {
         ofFirst_.clear();
         ofSecond_.clear();
         for (int dx = -reach_; dx <= reach_; ++dx)
-          if (!columnOf(dx).p.empty() && weigh(columnOf(dx), y, dx, dy, i, thresholds_[k]))
+          if (!columnOf(dx).p.empty() && weigh(columnOf(dx), y, dx, dy, i, thresholds_[k])) {
             listRows(columnOf(dx), y, dx, dy, tile_.radiance[i]);
+            if (kept_) keepWeights(columnOf(dx), y, dx, dy, i);
+          }
         WeightedSums& sums = sums_[k * images_ + i];
         const int count = wholeVectors(target_.width());
         if (y >= target_.y0) addRows(ofFirst_, count, sums, sumIndex(target_.x0, y));
@@ -196,6 +199,19 @@ class TileFilter {
     ofSecond_.push_back({weight - dx, rowsAt(u, tile_.index(target_.x0 - dx, y))});
   }
 
+  // The weights of pairs of row y of which a pixel is to keep them.
+  void keepWeights(const Column& column, int y, int dx, int dy, size_t image) {
+    const int stride = kept_->stride(), x0 = roundUp(target_.x0, stride);
+    const float* weight = column.weight.data() + kLead - target_.x0;
+    const auto keep = [&](int row, size_t k, const float* ofColumn) {
+      if (row < target_.y0 || row >= target_.y1 || row % stride != 0) return;
+      for (int x = x0; x < target_.x1; x += stride)
+        kept_->of(x, row, image)[k] = PatchWelchWeights::packed(ofColumn[x]);
+    };
+    keep(y, kept_->order(dx, dy), weight);
+    keep(y + dy, kept_->order(-dx, -dy), weight - dx);
+  }
+
   PixelRect target_;
   int width_, height_;  // of the image
   const std::vector<float>& thresholds_;
@@ -203,8 +219,9 @@ class TileFilter {
   int reach_;  // the largest distance in x and in y of a neighbour
   PatchWelchTile tile_;
   size_t images_;
-  std::vector<WeightedSums> sums_;       // [threshold][image]
-  std::vector<Column> columns_;  // by dx
+  PatchWelchWeights* kept_;         // or null
+  std::vector<WeightedSums> sums_;  // [threshold][image]
+  std::vector<Column> columns_;     // by dx
   // Buffers of rows; see position().
   std::array<PixelBuffer<float>, PatchWelchInput::kMaxImages> differences_;
   std::vector<WeightedRow> ofFirst_, ofSecond_;  // what is added to the sums of p, and of q
@@ -258,7 +275,8 @@ float squaredThreshold(double z, uint64_t passes) {
 
 std::vector<std::vector<Rgb<float>>> patchWelch(const PatchWelchInput& input, std::span<const double> thresholds,
                                                 const PatchWelchNeighbours& neighbours, TileSize tiles,
-                                                const std::atomic<bool>* cancel) {
+                                                const std::atomic<bool>* cancel, PatchWelchWeights* kept) {
+  BRAID_ASSERT(!kept || thresholds.size() == 1);
   BRAID_ASSERT(!thresholds.empty() && !input.images.empty() && input.images.size() <= PatchWelchInput::kMaxImages);
   BRAID_ASSERT(neighbours.inner <= neighbours.outer && neighbours.outer <= PatchWelchNeighbours::kMostOuter);
   const int width = input.width(), height = input.height();
@@ -271,7 +289,7 @@ std::vector<std::vector<Rgb<float>>> patchWelch(const PatchWelchInput& input, st
       for (std::vector<Rgb<float>>& images : out) blacken(tile, images);
       return;
     }
-    TileFilter filter(input, squared, neighbours, tile);
+    TileFilter filter(input, squared, neighbours, tile, kept);
     runVectorised([&] { filter.run(); });
     filter.write(out);
   });

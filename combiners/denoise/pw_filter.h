@@ -16,25 +16,15 @@
 #include <span>
 #include <vector>
 
+#include "combiners/denoise/pw_neighbours.h"
 #include "combiners/denoise/pw_tile.h"
+#include "combiners/denoise/pw_weights.h"
 #include "renderer/core/plane.h"
 
 namespace braid {
 
 inline constexpr double kPatchWelchThreshold = 1.6;      // of pw: for few samples
 inline constexpr double kPatchWelchWideThreshold = 2.2;  // of pw-wide and pw1: smoother
-// The pixels that are averaged in: all up to the inner distance in pixels, from there to the outer one every second, as
-// on a chessboard: 173 of the 253 pixels of the disc. Neighbours say much the same, so that the filters with them all
-// take 1.5 times as long for no less error in the mean (-2 to +3 % by number of samples over 14 scenes), and auto for
-// 0.4 % less.
-struct PatchWelchNeighbours {
-  static constexpr int kMostOuter = 9;
-  int inner = 5, outer = kMostOuter;  // 0 <= inner <= outer <= kMostOuter
-  constexpr bool contain(int dx, int dy) const {
-    const int distance2 = dx * dx + dy * dy;
-    return distance2 <= inner * inner || (distance2 <= outer * outer && (dx + dy) % 2 == 0);
-  }
-};
 // Of the spatial Gaussian, in pixels.
 inline constexpr double kPatchWelchSpatialSd = 5;
 // Keeps 0/0 away and nothing else, so that results scale with the light.
@@ -52,9 +42,11 @@ struct TileSize {
 
 // Filters each image of `input` with its own weights, for each threshold, in one pass over the distances: result[k][i]
 // is images[i] with threshold z = thresholds[k], at least one. Deterministic; the size of the tiles changes no bit.
-// Once `cancel` is set, tiles stay black.
+// Once `cancel` is set, tiles stay black. `kept`, if any, gets the weights of its pixels, of the only threshold; it was
+// made for these neighbours.
 std::vector<std::vector<Rgb<float>>> patchWelch(const PatchWelchInput& input, std::span<const double> thresholds,
                                                 const PatchWelchNeighbours& neighbours = {}, TileSize tiles = {},
-                                                const std::atomic<bool>* cancel = nullptr);
+                                                const std::atomic<bool>* cancel = nullptr,
+                                                PatchWelchWeights* kept = nullptr);
 
 }  // namespace braid
