@@ -42,31 +42,42 @@ struct Guides {
   const Rgb<float>*albedo = nullptr, *normal = nullptr;  // or null
 };
 
-// out[x] = |image_p - image_q|² for pixels p from index `p` on and q from index `q` on.
-void squaredDistances(const Rgb<float>& image, size_t p, size_t q, int count, float* __restrict out) {
-  const float* __restrict rp = &image[0][p], * __restrict gp = &image[1][p], * __restrict bp = &image[2][p];
-  const float* __restrict rq = &image[0][q], * __restrict gq = &image[1][q], * __restrict bq = &image[2][q];
+// The three rows of an image from a pixel on; null without an image.
+struct Rows3 {
+  const float *r = nullptr, *g = nullptr, *b = nullptr;
+  Rows3(const Rgb<float>* image, size_t i) {
+    if (image) r = &(*image)[0][i], g = &(*image)[1][i], b = &(*image)[2][i];
+  }
+};
+
+// |p - q|² of pixel x of two rows.
+inline float squaredDistance(const Rows3& p, const Rows3& q, int x) {
+  const float r = p.r[x] - q.r[x], g = p.g[x] - q.g[x], b = p.b[x] - q.b[x];
+  return r * r + g * g + b * b;
+}
+
+template <bool kHasAlbedo, bool kHasNormal>
+void kernelOfRow(const Guides& guides, size_t p, size_t q, float spatial, int count, float* __restrict out) {
+  const Rows3 colourP(guides.colour, p), colourQ(guides.colour, q);
+  const Rows3 albedoP(guides.albedo, p), albedoQ(guides.albedo, q);
+  const Rows3 normalP(guides.normal, p), normalQ(guides.normal, q);
+  const float *vp = guides.variance->data.data() + p, *vq = guides.variance->data.data() + q;
   for (int x = 0; x < count; ++x) {
-    const float r = rp[x] - rq[x], g = gp[x] - gq[x], b = bp[x] - bq[x];
-    out[x] = r * r + g * g + b * b;
+    float e = spatial + exponentScale(kColour) * (squaredDistance(colourP, colourQ, x) / (vp[x] + vq[x]));
+    if (kHasAlbedo) e += exponentScale(kAlbedo) * squaredDistance(albedoP, albedoQ, x);
+    if (kHasNormal) e += exponentScale(kNormal) * squaredDistance(normalP, normalQ, x);
+    out[x] = exp2NonPositive(std::max(-e, kLowestExponent));
   }
 }
 
-// kappa(p, q) of `count` pixel pairs.
-void kernelOfRow(const Guides& guides, size_t p, size_t q, float spatial, int count, float* __restrict out) {
-  float distance[kBlock];
-  squaredDistances(*guides.colour, p, q, count, distance);
-  const float* __restrict vp = guides.variance->data.data() + p, * __restrict vq = guides.variance->data.data() + q;
-  for (int x = 0; x < count; ++x) out[x] = spatial + exponentScale(kColour) * (distance[x] / (vp[x] + vq[x]));
-  if (guides.albedo) {
-    squaredDistances(*guides.albedo, p, q, count, distance);
-    for (int x = 0; x < count; ++x) out[x] += exponentScale(kAlbedo) * distance[x];
-  }
-  if (guides.normal) {
-    squaredDistances(*guides.normal, p, q, count, distance);
-    for (int x = 0; x < count; ++x) out[x] += exponentScale(kNormal) * distance[x];
-  }
-  for (int x = 0; x < count; ++x) out[x] = exp2NonPositive(std::max(-out[x], kLowestExponent));
+// kappa(p, q) of `count` pixel pairs, from p and q on.
+void kernelOfRow(const Guides& guides, size_t p, size_t q, float spatial, int count, float* out) {
+  if (guides.albedo)
+    guides.normal ? kernelOfRow<true, true>(guides, p, q, spatial, count, out)
+                  : kernelOfRow<true, false>(guides, p, q, spatial, count, out);
+  else
+    guides.normal ? kernelOfRow<false, true>(guides, p, q, spatial, count, out)
+                  : kernelOfRow<false, false>(guides, p, q, spatial, count, out);
 }
 
 // Filters columns [x0, x0 + count) of row y. `sums` has room for all maps.

@@ -73,14 +73,18 @@ void copyWindow(const float* from, ptrdiff_t pitch, Windowed& to) {
 // column <- (feature - centre) / (largest difference in the window + offset)
 void featureColumn(const float* __restrict feature, float centre, const float* __restrict mask,
                    float* __restrict column) {
-  float largest[kUnit] = {};
-  for (int i = 0; i < kCount; i += kUnit)
-    for (int l = 0; l < kUnit; ++l) {
-      const float d = mask[i + l] > 0 ? feature[i + l] - centre : 0.0f;
-      column[i + l] = d;
-      largest[l] = std::max(largest[l], d < 0 ? -d : d);
-    }
-  const float scale = 1.0f / (*std::max_element(largest, largest + kUnit) + kFeatureOffset);
+  Unit largest = {}, within, d;
+  for (int i = 0; i < kCount; i += kUnit) {
+    load(mask + i, within);
+    load(feature + i, d);
+    d = within > 0 ? d - centre : Unit{};
+    std::memcpy(column + i, &d, sizeof(d));
+    const Unit size = d < 0 ? -d : d;
+    largest = largest < size ? size : largest;
+  }
+  float most = 0;
+  for (int l = 0; l < kUnit; ++l) most = std::max(most, largest[l]);
+  const float scale = 1.0f / (most + kFeatureOffset);
   for (int i = 0; i < kCount; ++i) column[i] *= scale;
 }
 
