@@ -195,7 +195,7 @@ MethodResult Auto::run(const MethodInputs& in) const {
   const Estimate* whole = photonMaps.empty() ? in.unbiased : &fused.image;
   if (mayBeMeasured(*whole) && whole->variance.empty()) {
     whole = &changeable(*whole);
-    own->variance = meanVariance(*whole);
+    if (own->variance.empty()) own->variance = meanVariance(*whole);
   }
   if (in.options.number(kDespike) != 0 && mayBeMeasured(*whole)) {
     const std::vector<Spike> spikes = findSpikes(*whole, whole->variance, in.features);
