@@ -62,21 +62,7 @@ class PlainFilter {
     return out;
   }
 
- private:
-  double divisor(int x, int y, size_t c) const {
-    const Features* f = input_.features;
-    if (!f || f->depth.mean.at(x, y) == 0) return 1;
-    const Vec3 albedo = f->albedo.mean.pixel(f->albedo.mean[0].index(x, y));
-    return maxComponent(albedo) > 1 ? 1 : std::max(static_cast<double>(albedo[static_cast<int>(c)]), 0.03);
-  }
-  double radiance(int x, int y, size_t c) const {
-    return static_cast<double>((*input_.images[image_])[c].at(x, y)) / divisor(x, y, c);
-  }
-  double variance(int x, int y, size_t c) const {
-    return (image_ == 0 ? 1 : 2) * static_cast<double>(input_.variance[c].at(x, y)) / sqr(divisor(x, y, c));
-  }
-  bool inside(int x, int y) const { return x >= 0 && y >= 0 && x < input_.width() && y < input_.height(); }
-
+  // Of the pair (x, y), (u, v).
   double weight(int x, int y, int u, int v) const {
     double s = 0, count = 0;
     for (int j = -1; j <= 1; ++j)
@@ -98,6 +84,21 @@ class PlainFilter {
       }
     return rest * rest * std::exp(-exponent);
   }
+
+ private:
+  double divisor(int x, int y, size_t c) const {
+    const Features* f = input_.features;
+    if (!f || f->depth.mean.at(x, y) == 0) return 1;
+    const Vec3 albedo = f->albedo.mean.pixel(f->albedo.mean[0].index(x, y));
+    return maxComponent(albedo) > 1 ? 1 : std::max(static_cast<double>(albedo[static_cast<int>(c)]), 0.03);
+  }
+  double radiance(int x, int y, size_t c) const {
+    return static_cast<double>((*input_.images[image_])[c].at(x, y)) / divisor(x, y, c);
+  }
+  double variance(int x, int y, size_t c) const {
+    return (image_ == 0 ? 1 : 2) * static_cast<double>(input_.variance[c].at(x, y)) / sqr(divisor(x, y, c));
+  }
+  bool inside(int x, int y) const { return x >= 0 && y >= 0 && x < input_.width() && y < input_.height(); }
 
   const PatchWelchInput& input_;
   size_t image_;
@@ -181,6 +182,42 @@ TEST_CASE("Fewer neighbours give the filter without the others") {
     for (size_t k = 0; k < kThresholds.size(); ++k)
       for (size_t i = 0; i < 3; ++i)
         CHECK(worstDifference(images[k][i], PlainFilter(input, i, kThresholds[k], neighbours), 3) < 1e-4);
+  }
+}
+
+TEST_CASE("Kept weights are those of the formula, for every pixel of the grid and any tiles") {
+  for (const auto& [width, height, stride] : {std::array{1, 1, 5}, {7, 3, 1}, {60, 41, 7}}) {
+    const Case c = caseOf(width, height, 8);
+    const PatchWelchInput input = patchWelchInput(c.pt(), &featuresOf(c));
+    const auto kept = [&](TileSize tiles) {
+      PatchWelchWeights weights(width, height, 3, stride, {});
+      patchWelch(input, std::array{kPatchWelchWideThreshold}, {}, tiles, nullptr, &weights);
+      return weights;
+    };
+    const PatchWelchWeights usual = kept({}), small = kept({17, 5});
+    CHECK(usual.count() == 173);
+    double worst = 0, largest = 0;
+    bool same = true;
+    for (size_t i = 0; i < 3; ++i) {
+      const PlainFilter plain(input, i, kPatchWelchWideThreshold);
+      for (int y = 0; y < height; y += stride)
+        for (int x = 0; x < width; x += stride)
+          for (int dy = -9; dy <= 9; ++dy)
+            for (int dx = -9; dx <= 9; ++dx) {
+              if (!inPlainWindow(dx, dy) || (dx == 0 && dy == 0)) continue;
+              const size_t k = usual.order(dx, dy);
+              const bool inside = x + dx >= 0 && x + dx < width && y + dy >= 0 && y + dy < height;
+              const double expected = inside ? plain.weight(x, y, x + dx, y + dy) : 0.0;
+              const auto got = static_cast<double>(PatchWelchWeights::unpacked(usual.of(x, y, i)[k]));
+              worst = std::max(worst, std::fabs(got - expected));
+              largest = std::max(largest, got);
+              same = same && usual.of(x, y, i)[k] == small.of(x, y, i)[k];
+            }
+    }
+    CAPTURE(width);
+    CHECK(worst < 1e-4);
+    CHECK(same);
+    if (width > 1) CHECK(largest > 0.5);
   }
 }
 
