@@ -7,13 +7,16 @@
 #include <cstdlib>
 #include <new>
 
+#include "renderer/core/pixel_memory.h"
+
 namespace {
 
 std::atomic<int64_t> held{0}, peak{0};
 
 void* counted(void* memory) {
   if (!memory) throw std::bad_alloc();
-  const int64_t now = held += static_cast<int64_t>(malloc_usable_size(memory));
+  held += static_cast<int64_t>(malloc_usable_size(memory));
+  const int64_t now = braid::test::heapBytes();
   for (int64_t most = peak; now > most && !peak.compare_exchange_weak(most, now);) {
   }
   return memory;
@@ -49,8 +52,8 @@ void operator delete[](void* memory, size_t, std::align_val_t) noexcept { releas
 
 namespace braid::test {
 
-int64_t heapBytes() { return held; }
+int64_t heapBytes() { return held + static_cast<int64_t>(mappedPixelBytes()); }
 int64_t heapPeak() { return peak; }
-void resetHeapPeak() { peak = held.load(); }
+void resetHeapPeak() { peak = heapBytes(); }
 
 }  // namespace braid::test

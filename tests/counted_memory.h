@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts what the test program takes from the heap by operator new (tests/counted_memory.cpp).
+// Counts what the test program takes from the heap by operator new, and for image planes (tests/counted_memory.cpp).
 #pragma once
 
 #include <cstdint>

@@ -4,10 +4,13 @@
 #include <sys/mman.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <mutex>
 #include <new>
 #include <vector>
+
+#include "renderer/core/pixel_memory.h"
 
 namespace braid {
 
@@ -21,6 +24,9 @@ constexpr size_t wholePages(size_t bytes) {
   return (bytes + kPage - 1) / kPage * kPage;
 }
 
+// Of mapped buffers. By itself, so that it may be read while the buffers are made.
+std::atomic<size_t> usedBytes{0};
+
 // Mapped buffers: what is in use is counted, what was freed is kept, the last one at the end.
 class MappedBuffers {
  public:
@@ -28,8 +34,8 @@ class MappedBuffers {
   // and older ones have made room for a new one.
   void* take(size_t bytes) {
     const std::lock_guard lock(mutex_);
-    used_ += bytes;
-    mostUsed_ = std::max(mostUsed_, used_);
+    usedBytes += bytes;
+    mostUsed_ = std::max(mostUsed_, usedBytes.load());
     size_t best = kept_.size();
     for (size_t i = kept_.size(); i > 0; --i) {
       const size_t size = kept_[i - 1].bytes;
@@ -37,13 +43,13 @@ class MappedBuffers {
       if (size > bytes && (best == kept_.size() || size < kept_[best].bytes)) best = i - 1;
     }
     if (best < kept_.size()) return cut(best, bytes);
-    while (used_ + held_ > mostUsed_) dropOldest();
+    while (usedBytes + held_ > mostUsed_) dropOldest();
     return nullptr;
   }
 
   void give(void* memory, size_t bytes) noexcept {
     const std::lock_guard lock(mutex_);
-    used_ -= bytes;
+    usedBytes -= bytes;
     try {
       kept_.push_back({memory, bytes});
       held_ += bytes;
@@ -55,8 +61,8 @@ class MappedBuffers {
   // What take() promised could not be had.
   void failed(size_t bytes) noexcept {
     const std::lock_guard lock(mutex_);
-    used_ -= bytes;
-    mostUsed_ = used_ + held_;
+    usedBytes -= bytes;
+    mostUsed_ = usedBytes + held_;
   }
 
   void drop() noexcept {
@@ -93,7 +99,7 @@ class MappedBuffers {
 
   std::mutex mutex_;
   std::vector<Buffer> kept_;
-  size_t held_ = 0, used_ = 0, mostUsed_ = 0;  // bytes; used_ + held_ <= mostUsed_
+  size_t held_ = 0, mostUsed_ = 0;  // bytes; used + held_ <= mostUsed_
 };
 
 // Outlives every plane, those in static storage too.
@@ -134,6 +140,8 @@ void freePixels(void* memory, size_t bytes) noexcept {
   else
     mappedBuffers().give(memory, wholePages(bytes));
 }
+
+size_t mappedPixelBytes() noexcept { return usedBytes; }
 
 void dropKeptPixels() noexcept { mappedBuffers().drop(); }
 
