@@ -276,8 +276,8 @@ float squaredThreshold(double z, uint64_t passes) {
 std::vector<std::vector<Rgb<float>>> patchWelch(const PatchWelchInput& input, std::span<const double> thresholds,
                                                 const PatchWelchNeighbours& neighbours, TileSize tiles,
                                                 const std::atomic<bool>* cancel, PatchWelchWeights* kept) {
+  BRAID_ASSERT(!thresholds.empty() && (input.images.size() == 1 || input.images.size() == 3));
   BRAID_ASSERT(!kept || thresholds.size() == 1);
-  BRAID_ASSERT(!thresholds.empty() && !input.images.empty() && input.images.size() <= PatchWelchInput::kMaxImages);
   BRAID_ASSERT(neighbours.inner <= neighbours.outer && neighbours.outer <= PatchWelchNeighbours::kMostOuter);
   const int width = input.width(), height = input.height();
   std::vector<std::vector<Rgb<float>>> out(thresholds.size());
