@@ -198,7 +198,8 @@ MethodResult Auto::run(const MethodInputs& in) const {
     if (own->variance.empty()) own->variance = meanVariance(*whole);
   }
   if (in.options.number(kDespike) != 0 && mayBeMeasured(*whole)) {
-    const std::vector<Spike> spikes = findSpikes(*whole, whole->variance, in.features);
+    const GivenQuarters quarters = photonMaps.empty() ? in.quarters : GivenQuarters{&fused.image.quarter};
+    const std::vector<Spike> spikes = findSpikes(whole->mean, quarters, whole->variance, in.features);
     result.remarks.push_back(countRemark("replacedOutliers", spikes.size()));
     if (!fused.noise.empty()) replaceVariances(fused.noise, spikes);
     if (!spikes.empty()) {

@@ -8,18 +8,16 @@
 
 namespace braid {
 
-// Means over windows of (2 radius + 1)² pixels. A constant plane stays what it is, to the bit.
-template <class T>
-Plane<double> boxMean(const Plane<T>& in, int radius) {
-  Plane<double> out = boxSum(in, radius);
-  parallelRows(in.height, [&](int y) {
-    const int rows = std::min(in.height - 1, y + radius) - std::max(0, y - radius) + 1;
-    for (int x = 0; x < in.width; ++x) {
-      const int columns = std::min(in.width - 1, x + radius) - std::max(0, x - radius) + 1;
-      out.at(x, y) /= static_cast<double>(rows) * columns;
-    }
+// Means over windows of (2 radius + 1)² pixels. A constant plane stays what it is: in doubles to the bit, in floats to
+// the rounding of a sum.
+template <class Out = double, class T>
+Plane<Out> boxMean(const Plane<T>& in, int radius) {
+  const int right = in.width - 1, bottom = in.height - 1;
+  return finishedBoxSum<Out>(in, radius, WindowBorder::Clamped, [=](double sum, int x, int y) {
+    const int columns = std::min(right, x + radius) - std::max(0, x - radius) + 1,
+              rows = std::min(bottom, y + radius) - std::max(0, y - radius) + 1;
+    return sum / (static_cast<double>(rows) * columns);
   });
-  return out;
 }
 
 }  // namespace braid

@@ -36,18 +36,22 @@ std::vector<char> candidates(const Rgb<float>& variance) {
     for (size_t c = 0; c < 3; ++c) v += static_cast<double>(variance[c][i]) / 3;
     return std::sqrt(v);
   });
-  const Plane<double> around = mirrorBoxMean(deviation, kDeviationRadius);
+  const Plane<float> around = mirrorBoxMean<float>(deviation, kDeviationRadius);
   std::vector<char> out(deviation.size());
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) out[i] = static_cast<double>(deviation[i]) > kDeviationRatio * around[i];
+    for (size_t i = begin; i < end; ++i)
+      out[i] = static_cast<double>(deviation[i]) > kDeviationRatio * static_cast<double>(around[i]);
   });
   return out;
 }
 
 // The mean of the two darkest quarters.
-double darkHalf(const Estimate& unbiased, size_t i) {
+double darkHalf(const GivenQuarters& quarters, size_t i) {
   std::array<double, 4> values{};
-  for (size_t q = 0; q < 4; ++q) values[q] = brightness(unbiased.quarter[q], i);
+  for (size_t q = 0; q < 4; ++q) {
+    const double value = quarters.scale * brightness((*quarters.images)[q], i);
+    values[q] = std::isfinite(value) ? value : 0;
+  }
   std::sort(values.begin(), values.end());
   return 0.5 * (values[0] + values[1]);
 }
@@ -87,10 +91,10 @@ Neighbours neighboursOf(const Rgb<float>& image, const Rgb<float>& variance, con
 
 }  // namespace
 
-std::vector<Spike> findSpikes(const Estimate& unbiased, const Rgb<float>& variance, const Features* features) {
+std::vector<Spike> findSpikes(const Rgb<float>& image, const GivenQuarters& quarters, const Rgb<float>& variance,
+                              const Features* features) {
   std::vector<Spike> spikes;
-  if (unbiased.quarter.size() != 4) return spikes;
-  const Rgb<float>& image = unbiased.mean;
+  if (!quarters.images || quarters.images->size() != 4) return spikes;
   const std::vector<char> candidate = candidates(variance);
   for (int y = 0; y < image.height(); ++y)
     for (int x = 0; x < image.width(); ++x) {
@@ -102,7 +106,7 @@ std::vector<Spike> findSpikes(const Estimate& unbiased, const Rgb<float>& varian
       const double mean = (n.mean[0] + n.mean[1] + n.mean[2]) / 3;
       // On the rim of a lamp no neighbour is of the same surface, and the others may be brighter.
       if (value <= mean) continue;
-      if (darkHalf(unbiased, i) - mean >= kQuarterShare * (value - mean)) continue;
+      if (darkHalf(quarters, i) - mean >= kQuarterShare * (value - mean)) continue;
       Spike spike{i};
       for (int c = 0; c < 3; ++c) {
         spike.value[c] = finiteFloat(n.mean[static_cast<size_t>(c)]);

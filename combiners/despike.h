@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "renderer/film/estimates.h"
+#include "renderer/film/combiner.h"
 
 namespace braid {
 
@@ -15,8 +15,8 @@ struct Spike {
   Spectrum value{0}, variance{0};
 };
 
-// The spikes of an estimate (ALGORITHMS-BEYOND 8.3, step 6, looks for them in what has been combined; by then filters
-// have spread them over their neighbours). A pixel is one if
+// The spikes of an unbiased image (ALGORITHMS-BEYOND 8.3, step 6, looks for them in what has been combined; by then
+// filters have spread them over their neighbours). A pixel is one if
 //   - its standard deviation, sqrt(mean_RGB v), is above 8 times the mean of these over 15x15 pixels;
 //   - it is brighter than all of its 5x5 neighbours that are no candidates and lie on the same surface, and than the
 //     mean that would replace it;
@@ -25,7 +25,8 @@ struct Spike {
 // Value and variance are replaced by the means of those neighbours, weighted by nearness and by likeness in albedo and
 // normal. The third condition makes spikes vanish as samples grow: what is there shows in every quarter. Needs the four
 // quarters; without them there are no spikes. `variance` is that of the mean.
-std::vector<Spike> findSpikes(const Estimate& unbiased, const Rgb<float>& variance, const Features* features);
+std::vector<Spike> findSpikes(const Rgb<float>& image, const GivenQuarters& quarters, const Rgb<float>& variance,
+                              const Features* features);
 
 // Writes the replacements into an image or into a variance.
 void replaceValues(Rgb<float>& image, const std::vector<Spike>& spikes);

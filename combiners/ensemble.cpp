@@ -43,7 +43,7 @@ class Ensemble : public Method {
   }
   MethodMemory memory(const MemoryCase& of) const override {
     const bool quarters = of.passes == 0 || of.passes >= 4;
-    return {quarters ? 72 + 17 * of.bases : 82 + 4 * of.bases, 40 + 4 * of.bases};
+    return {quarters ? 50 + 23 * of.bases : 72 + 4 * of.bases, 40 + 4 * of.bases};
   }
   std::vector<OptionInfo> options() const override {
     return {kPatch, kFilter, kShared, kNonNegative, kFullError, kRelative};

@@ -76,7 +76,7 @@ Plane<float> squaredErrorSamples(const Rgb<float> (&halves)[2], const Estimate& 
 
 Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
                       const Rgb<float>& guide, bool follows) {
-  // The planes take the relative values in the place of the samples, and the mean errors in the place of a mean.
+  // The planes take the relative values in the place of the samples, then their means, and last the errors.
   Plane<float> samples = squaredErrorSamples(halves, unbiased, variance);
   Plane<float> spread = varianceSamples(halves);
   const Plane<float> unit = relativeUnits(guide);
@@ -92,15 +92,16 @@ Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, c
       if (follows) levels[i] = finiteFloat(v / (u + v));
     }
   });
-  const Plane<double> noise = boxMean(spread, 1), bias = boxMean(samples, kBiasRadius);
-  Plane<double> level;
-  if (follows) level = boxMean(levels, kBiasRadius);
+  spread = boxMean<float>(spread, 1);
+  samples = boxMean<float>(samples, kBiasRadius);
+  if (follows) levels = boxMean<float>(levels, kBiasRadius);
   Plane<float> out = std::move(samples);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
-      const double ofHalves = std::max(0.0, bias[i]), v2 = follows ? 2 * level[i] : 0;
-      const double share = follows ? v2 / std::max(v2 + 2 * noise[i] + ofHalves, 1e-300) : 1;
-      out[i] = finiteFloat(static_cast<double>(unit[i]) * (noise[i] + share * ofHalves));
+      const auto noise = static_cast<double>(spread[i]), ofHalves = std::max(0.0, static_cast<double>(out[i]));
+      const double v2 = follows ? 2 * static_cast<double>(levels[i]) : 0;
+      const double share = follows ? v2 / std::max(v2 + 2 * noise + ofHalves, 1e-300) : 1;
+      out[i] = finiteFloat(static_cast<double>(unit[i]) * (noise + share * ofHalves));
     }
   });
   return out;
@@ -113,10 +114,10 @@ Plane<float> smoothedSquaredBias(const Plane<float>& squaredBias, const Rgb<floa
     for (size_t i = begin; i < end; ++i)
       relative[i] = finiteFloat(static_cast<double>(squaredBias[i]) / static_cast<double>(unit[i]));
   });
-  const Plane<double> mean = boxMean(relative, kBiasRadius);
-  Plane<float> out = std::move(relative);
+  Plane<float> out = boxMean<float>(relative, kBiasRadius);
   parallelChunks(unit.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) out[i] = finiteFloat(static_cast<double>(unit[i]) * std::max(0.0, mean[i]));
+    for (size_t i = begin; i < end; ++i)
+      out[i] = finiteFloat(static_cast<double>(unit[i]) * std::max(0.0, static_cast<double>(out[i])));
   });
   return out;
 }

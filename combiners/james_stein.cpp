@@ -70,7 +70,7 @@ class JamesStein : public Method {
     needs.passes = 4;
     return needs;
   }
-  MethodMemory memory(const MemoryCase& /*of*/) const override { return {220, 52}; }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {208, 52}; }
   std::vector<OptionInfo> options() const override {
     return {kConstant, kRegression, kVariance, kSigma, kCrossed, kGlobal, kPositivePart, kStride, kGate, kMeasured};
   }
@@ -151,7 +151,7 @@ MethodResult JamesStein::run(const MethodInputs& in) const {
   const Rgb<float> variance = meanVariance(x);
   const Targets targets = targetsOf(in, variance, result);
   const NoiseScale scale = noiseScale(variance, settings);
-  std::array<Plane<double>, 3> least;
+  std::array<Plane<float>, 3> least;
   const bool measured = halves && settings.positivePart && !settings.global && in.options.number(kMeasured) != 0;
   if (measured) least = measuredFactors(x, targets.half, scale.gate, settings.radius);
   const auto shrink = [&](const Rgb<float>& image, const Rgb<float>& noise, const NoiseScale& units,

@@ -3,13 +3,14 @@
 
 #include <algorithm>
 
+#include "combiners/finite_float.h"
 #include "combiners/mirror.h"
 
 namespace braid {
 
-std::array<Plane<double>, 3> measuredFactors(const Estimate& x, const Rgb<float> (&y)[2], const Plane<float>& gate,
-                                             int radius) {
-  std::array<Plane<double>, 3> out;
+std::array<Plane<float>, 3> measuredFactors(const Estimate& x, const Rgb<float> (&y)[2], const Plane<float>& gate,
+                                            int radius) {
+  std::array<Plane<float>, 3> out;
   for (size_t c = 0; c < 3; ++c) {
     Plane<double> products(x.mean.width(), x.mean.height()), squares(x.mean.width(), x.mean.height());
     parallelChunks(products.size(), kPixelChunk, [&](size_t begin, size_t end) {
@@ -21,10 +22,12 @@ std::array<Plane<double>, 3> measuredFactors(const Estimate& x, const Rgb<float>
         squares[i] = sqr(xa - ya) + sqr(xb - yb);
       }
     });
-    out[c] = mirrorBoxMean(products, radius);
-    const Plane<double> norm = mirrorBoxMean(squares, radius);
-    parallelChunks(norm.size(), kPixelChunk, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) out[c][i] = norm[i] > 0 ? std::clamp(out[c][i] / norm[i], 0.0, 1.0) : 0.0;
+    products = mirrorBoxMean(products, radius);
+    squares = mirrorBoxMean(squares, radius);
+    out[c] = Plane<float>(x.mean.width(), x.mean.height(), kUnfilled);
+    parallelChunks(products.size(), kPixelChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i)
+        out[c][i] = squares[i] > 0 ? finiteFloat(std::clamp(products[i] / squares[i], 0.0, 1.0)) : 0.0f;
     });
   }
   return out;

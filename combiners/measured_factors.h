@@ -15,7 +15,7 @@ namespace braid {
 // 0 where X and Y agree. The noise of a half is larger than that of the whole, hence f is rather too small, and James
 // and Stein's factor larger, unless Y's errors are those of X. Pixels with a positive `gate` count for nothing; it may
 // be empty.
-std::array<Plane<double>, 3> measuredFactors(const Estimate& x, const Rgb<float> (&y)[2], const Plane<float>& gate,
-                                             int radius);
+std::array<Plane<float>, 3> measuredFactors(const Estimate& x, const Rgb<float> (&y)[2], const Plane<float>& gate,
+                                            int radius);
 
 }  // namespace braid

@@ -22,9 +22,9 @@ Plane<T> mirrorPadded(const Plane<T>& in, int radius) {
 }
 
 // Means over windows of (2 radius + 1)² pixels.
-template <class T>
-Plane<double> mirrorBoxMean(const Plane<T>& in, int radius) {
-  return boxSum(in, radius, WindowBorder::Mirrored, 1.0 / ((2.0 * radius + 1) * (2.0 * radius + 1)));
+template <class Out = double, class T>
+Plane<Out> mirrorBoxMean(const Plane<T>& in, int radius) {
+  return boxSum<Out>(in, radius, WindowBorder::Mirrored, 1.0 / ((2.0 * radius + 1) * (2.0 * radius + 1)));
 }
 
 }  // namespace braid

@@ -16,7 +16,7 @@ class OneHotNfor : public Method {
   const char* description() const override { return "One base a pixel, by errors smoothed along the noisy image"; }
   MethodKind kind() const override { return MethodKind::Combiner; }
   Needs needs() const override { return oneHotNeeds(); }
-  MethodMemory memory(const MemoryCase& of) const override { return {98 + 12 * of.bases, 40 + 4 * of.bases}; }
+  MethodMemory memory(const MemoryCase& of) const override { return {80 + 12 * of.bases, 40 + 4 * of.bases}; }
 
   MethodResult run(const MethodInputs& in) const override {
     const Rgb<float> variance = meanVariance(*in.unbiased);

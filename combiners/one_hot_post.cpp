@@ -19,7 +19,7 @@ class OneHotPost : public Method {
     needs.features = true;
     return needs;
   }
-  MethodMemory memory(const MemoryCase& of) const override { return {126 + 8 * of.bases, 40 + 4 * of.bases}; }
+  MethodMemory memory(const MemoryCase& of) const override { return {104 + 8 * of.bases, 40 + 4 * of.bases}; }
 
   MethodResult run(const MethodInputs& in) const override {
     const WeightMaps raw = selectionMaps(baseErrors(*in.unbiased, in.bases));

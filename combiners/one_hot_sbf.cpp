@@ -19,7 +19,7 @@ class OneHotSbf : public Method {
     needs.features = needs.featureNoise = true;
     return needs;
   }
-  MethodMemory memory(const MemoryCase& of) const override { return {78 + 8 * of.bases, 40 + 4 * of.bases}; }
+  MethodMemory memory(const MemoryCase& of) const override { return {68 + 8 * of.bases, 40 + 4 * of.bases}; }
 
   MethodResult run(const MethodInputs& in) const override {
     const auto errors = featureFiltered(baseErrors(*in.unbiased, in.bases), in.features, passesOf(*in.unbiased));

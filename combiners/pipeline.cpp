@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "combiners/pipeline.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
@@ -74,13 +75,15 @@ class Runner {
 
   using Earlier = std::pair<std::string, uint64_t>;  // name, passes
 
-  Estimates all_;                        // normalised; so are the results until finish()
+  Estimates all_;  // normalised; so are the results until finish()
+  const Estimates* given_ = nullptr;
   const Features* features_ = nullptr;   // the given ones, if they are fit as they are
   std::map<Earlier, Estimate> earlier_;  // images of checkpoints
   const PipelineOptions& options_;
 };
 
 void Runner::normalise(const Estimates& estimates, const Recipe& recipe) {
+  given_ = &estimates;
   std::string unbiased;
   for (const Step& step : recipe.steps)
     if (unbiased.empty()) unbiased = step.unbiased;
@@ -139,6 +142,8 @@ MethodInputs Runner::inputsOf(const Step& step) const {
   in.correlated = estimate(step.correlated);
   for (const std::string& base : step.bases) in.bases.push_back(estimate(base));
   in.features = features_;
+  const Estimate* given = step.kept == 0 ? given_->find(step.unbiased) : nullptr;
+  if (given && given->quarter.size() == 4) in.quarters = {&given->quarter, result.exposure};
   const auto history = all_.history.find(step.unbiased);
   in.history = history == all_.history.end() ? nullptr : &history->second;
   in.seed = all_.seed;
@@ -237,7 +242,12 @@ const PipelineOutput* PipelineResult::find(const std::string& name) const {
 
 PlanesRead planesRead(const Recipe& recipe) {
   const RecipeNeeds needs = needsOf(recipe);
-  return {needs.quarters, needs.checkpoints > 0 || !needs.stops.empty(), needs.features, needs.featureNoise};
+  // Photon maps, which are bases, are fused with all of the quarters.
+  const bool quarters = std::any_of(recipe.steps.begin(), recipe.steps.end(), [](const Step& step) {
+    const Needs of = step.method->needs();
+    return step.obstacle.empty() && (of.quarters || (of.quartersHelp && !step.bases.empty()));
+  });
+  return {quarters, needs.checkpoints > 0 || !needs.stops.empty(), needs.features, needs.featureNoise};
 }
 
 PipelineResult runPipeline(const Estimates& estimates, const std::vector<std::string>& wanted,

@@ -22,13 +22,13 @@ constexpr double kImprovement = 1e-5;  // weights to 1e-9 of the error change no
 
 Plane<float> relativeErrorRoots(const Rgb<float>& guide, const Rgb<float>& variance) {
   const Plane<float> own = channelMean(guide, [&](size_t i, size_t c) { return static_cast<double>(guide[c][i]); });
-  const Plane<double> around = boxMean(own, 1);
+  const Plane<float> around = boxMean<float>(own, 1);
   const Plane<float> noise =
       channelMean(variance, [&](size_t i, size_t c) { return static_cast<double>(variance[c][i]); });
   Plane<float> out(guide.width(), guide.height(), kUnfilled);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
-      const double level = 0.5 * (static_cast<double>(own[i]) + around[i]);
+      const double level = 0.5 * (static_cast<double>(own[i]) + static_cast<double>(around[i]));
       out[i] = finiteFloat(1 / std::sqrt(level * level + 0.01 + kVarianceShare * static_cast<double>(noise[i])));
     }
   });

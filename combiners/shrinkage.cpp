@@ -24,10 +24,13 @@ void forAll(size_t count, const Body& body) {
   });
 }
 
+double pixelsOfBlock(const JamesSteinSettings& s) { return (2.0 * s.radius + 1) * (2.0 * s.radius + 1); }
+
 // Combines values of the mirrored window along x, then along y, one by one.
 template <class Combine>
-Plane<double> separable(const Plane<float>& in, int radius, const Combine& combine) {
-  Plane<double> rows(in.width, in.height), out(in.width, in.height);
+Plane<float> separable(const Plane<float>& in, int radius, const Combine& combine) {
+  Plane<double> rows(in.width, in.height);
+  Plane<float> out(in.width, in.height);
   parallelRows(in.height, [&](int y) {
     for (int x = 0; x < in.width; ++x) {
       double sum = 0;
@@ -40,13 +43,13 @@ Plane<double> separable(const Plane<float>& in, int radius, const Combine& combi
     for (int x = 0; x < in.width; ++x) {
       double sum = 0;
       for (int d = -radius; d <= radius; ++d) sum = combine(sum, rows.at(x, mirrorIndex(y + d, in.height)), d);
-      out.at(x, y) = sum;
+      out.at(x, y) = finiteFloat(sum);
     }
   });
   return out;
 }
 
-Plane<double> gaussianMean(const Plane<float>& in, int radius, double sigma) {
+Plane<float> gaussianMean(const Plane<float>& in, int radius, double sigma) {
   std::vector<double> weights(static_cast<size_t>(2 * radius + 1));
   double total = 0;
   for (int d = -radius; d <= radius; ++d)
@@ -56,27 +59,27 @@ Plane<double> gaussianMean(const Plane<float>& in, int radius, double sigma) {
   });
 }
 
-// What is subtracted from SSE, before the constant: (p - 2) sigma², or its robust counterpart.
-Plane<double> numerators(const Plane<float>& variance, const JamesSteinSettings& s) {
-  const double p = (2.0 * s.radius + 1) * (2.0 * s.radius + 1);
-  Plane<double> out = s.filter == VarianceFilter::Gaussian ? gaussianMean(variance, s.radius, std::max(s.sigma, 1e-3))
-                                                           : mirrorBoxMean(variance, s.radius);
-  if (s.filter != VarianceFilter::Robust) {
-    forAll(out.size(), [&](size_t i) { out[i] *= p - 2; });
-    return out;
-  }
-  const Plane<double> most =
+// What is subtracted from SSE, before the constant, over (p - 2): sigma², or its robust counterpart.
+Plane<float> noiseOfBlocks(const Plane<float>& variance, const JamesSteinSettings& s) {
+  if (s.filter == VarianceFilter::Gaussian) return gaussianMean(variance, s.radius, std::max(s.sigma, 1e-3));
+  Plane<float> out = mirrorBoxMean<float>(variance, s.radius);
+  if (s.filter != VarianceFilter::Robust) return out;
+  const Plane<float> most =
       separable(variance, s.radius, [](double sum, double value, int) { return std::max(sum, value); });
-  forAll(out.size(), [&](size_t i) { out[i] = std::max(0.0, p * out[i] - 2 * most[i]); });
+  const double p = pixelsOfBlock(s);
+  forAll(out.size(), [&](size_t i) {
+    const double rest = p * static_cast<double>(out[i]) - 2 * static_cast<double>(most[i]);
+    out[i] = finiteFloat(std::max(0.0, rest / (p - 2)));
+  });
   return out;
 }
 
 // One over what a squared difference is measured in.
 Plane<float> inverseUnits(const Plane<float>& variance) {
-  const Plane<double> around = usualVariance(variance);
-  Plane<float> out(variance.width, variance.height, kUnfilled);
+  Plane<float> out = usualVariance(variance);
   forAll(out.size(), [&](size_t i) {
-    out[i] = static_cast<float>(1 / std::max(0.5 * (static_cast<double>(variance[i]) + around[i]), 1e-30));
+    const double unit = 0.5 * (static_cast<double>(variance[i]) + static_cast<double>(out[i]));
+    out[i] = static_cast<float>(1 / std::max(unit, 1e-30));
   });
   return out;
 }
@@ -95,23 +98,25 @@ struct Terms {
 };
 
 // The mean factor of every pixel of one channel; those of blocks are not below `least`, if any.
-Plane<double> factors(Terms terms, const JamesSteinSettings& s, const Plane<double>* least) {
+Plane<float> factors(Terms terms, const JamesSteinSettings& s, const Plane<float>* least) {
   if (s.global) {
     const auto n = static_cast<double>(terms.squares.size());
     const double numerator = s.constant * std::max(0.0, n - 2) / n * total(terms.noise);
     return {terms.squares.width, terms.squares.height,
-            shrinkageFactor(numerator, total(terms.squares), s.positivePart)};
+            finiteFloat(shrinkageFactor(numerator, total(terms.squares), s.positivePart))};
   }
-  const double p = (2.0 * s.radius + 1) * (2.0 * s.radius + 1);
-  Plane<double> numerator = numerators(terms.noise, s);
+  const double p = pixelsOfBlock(s);
+  Plane<float> noise = noiseOfBlocks(terms.noise, s);
   terms.noise = {};  // no more memory at once than is needed: the first touch of new memory takes longer than the loop
-  Plane<double> factor = mirrorBoxMean(terms.squares, s.radius);
+  Plane<float> factor = mirrorBoxMean<float>(terms.squares, s.radius);
   terms.squares = {};
-  forAll(factor.size(),
-         [&](size_t i) { factor[i] = shrinkageFactor(s.constant * numerator[i], p * factor[i], s.positivePart); });
-  numerator = {};
+  forAll(factor.size(), [&](size_t i) {
+    const double numerator = s.constant * (p - 2) * static_cast<double>(noise[i]);
+    factor[i] = finiteFloat(shrinkageFactor(numerator, p * static_cast<double>(factor[i]), s.positivePart));
+  });
+  noise = {};
   if (least) forAll(factor.size(), [&](size_t i) { factor[i] = std::max(factor[i], (*least)[i]); });
-  return mirrorBoxMean(factor, s.radius);
+  return mirrorBoxMean<float>(factor, s.radius);
 }
 
 struct TermRows {
@@ -163,18 +168,11 @@ Terms termsOf(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale&
 }
 
 // out = max(0, y + factor (x - y))
-void blendRow(const float* __restrict x, const float* __restrict y, const double* __restrict factor, size_t count,
+void blendRow(const float* __restrict x, const float* __restrict y, const float* __restrict factor, size_t count,
               float* __restrict out) {
   for (size_t i = 0; i < count; ++i) {
     const auto other = static_cast<double>(y[i]);
-    out[i] = finiteFloat(std::max(0.0, other + factor[i] * (static_cast<double>(x[i]) - other)));
-  }
-}
-
-void keepFactors(const Plane<double>& factor, size_t firstChannel, size_t lastChannel, Rgb<float>& out) {
-  for (size_t c = firstChannel; c < lastChannel; ++c) {
-    out[c] = Plane<float>(factor.width, factor.height, kUnfilled);
-    forAll(factor.size(), [&](size_t i) { out[c][i] = finiteFloat(factor[i]); });
+    out[i] = finiteFloat(std::max(0.0, other + static_cast<double>(factor[i]) * (static_cast<double>(x[i]) - other)));
   }
 }
 
@@ -186,11 +184,11 @@ double shrinkageFactor(double numerator, double sumOfSquares, bool positivePart)
   return positivePart ? std::max(0.0, factor) : factor;
 }
 
-Plane<double> usualVariance(const Plane<float>& variance) {
+Plane<float> usualVariance(const Plane<float>& variance) {
   Plane<float> roots(variance.width, variance.height, kUnfilled);
   forAll(roots.size(), [&](size_t i) { roots[i] = std::sqrt(std::sqrt(std::max(0.0f, variance[i]))); });
-  Plane<double> mean = mirrorBoxMean(roots, 3);
-  forAll(mean.size(), [&](size_t i) { mean[i] = mean[i] * mean[i] * mean[i] * mean[i]; });
+  Plane<float> mean = mirrorBoxMean<float>(roots, 3);
+  forAll(mean.size(), [&](size_t i) { mean[i] = finiteFloat(sqr(sqr(static_cast<double>(mean[i])))); });
   return mean;
 }
 
@@ -215,10 +213,10 @@ Plane<float> outlierGate(const Rgb<float>& variance, int radius) {
     deviation[i] = static_cast<float>(std::sqrt(v));
     roots[i] = std::sqrt(deviation[i]);
   });
-  const Plane<double> around = mirrorBoxMean(roots, radius);
+  const Plane<float> around = mirrorBoxMean<float>(roots, radius);
   forAll(roots.size(), [&](size_t i) {
     const auto own = static_cast<double>(deviation[i]);
-    deviation[i] = own > 5 * around[i] * around[i] ? finiteFloat(sqr(3 * own)) : 0.0f;
+    deviation[i] = own > 5 * sqr(static_cast<double>(around[i])) ? finiteFloat(sqr(3 * own)) : 0.0f;
   });
   return deviation;
 }
@@ -236,13 +234,13 @@ ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rg
 }
 
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale& scale, const Rgb<float>& y,
-                       const JamesSteinSettings& settings, const std::array<Plane<double>, 3>* least) {
+                       const JamesSteinSettings& settings, const std::array<Plane<float>, 3>* least) {
   BRAID_ASSERT(!least || !settings.global);
   ShrunkImage out;
   out.image = Rgb<float>(x.width(), x.height(), kUnfilled);
   const size_t together = settings.shared ? 3 : 1;
   for (size_t first = 0; first < 3; first += together) {
-    Plane<double> factor =
+    Plane<float> factor =
         factors(termsOf(x, variance, scale, y, first, together), settings, least ? &(*least)[first] : nullptr);
     parallelChunks(x.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i)
@@ -250,7 +248,7 @@ ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const No
       for (size_t c = first; c < first + together; ++c)
         runVectorised([&] { blendRow(&x[c][begin], &y[c][begin], &factor[begin], end - begin, &out.image[c][begin]); });
     });
-    if (settings.keepFactors) keepFactors(factor, first, first + together, out.factor);
+    for (size_t c = first; settings.keepFactors && c < first + together; ++c) out.factor[c] = factor;
   }
   return out;
 }

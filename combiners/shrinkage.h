@@ -46,7 +46,7 @@ double shrinkageFactor(double numerator, double sumOfSquares, bool positivePart)
 
 // The variance of most pixels around every one: the fourth power of the 7x7 mean of the fourth roots, to which a few
 // outliers add little.
-Plane<double> usualVariance(const Plane<float>& variance);
+Plane<float> usualVariance(const Plane<float>& variance);
 
 // What of the noise does not depend on Y: worth keeping when one image is shrunk towards several.
 struct NoiseScale {
@@ -76,6 +76,6 @@ ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rg
 // The same with the scale of these settings and this variance. The factors of blocks are not below `least`, by channel;
 // null: 0. It must be null for one factor for the whole image.
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale& scale, const Rgb<float>& y,
-                       const JamesSteinSettings& settings, const std::array<Plane<double>, 3>* least = nullptr);
+                       const JamesSteinSettings& settings, const std::array<Plane<float>, 3>* least = nullptr);
 
 }  // namespace braid

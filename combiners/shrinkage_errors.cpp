@@ -66,9 +66,10 @@ Plane<double> trimmedMean(const Plane<float>& in) {
 
 // Variances of at most 64 times what is usual around them.
 Plane<float> withoutOutliers(const Plane<float>& variance) {
-  const Plane<double> usual = usualVariance(variance);
+  const Plane<float> usual = usualVariance(variance);
   Plane<float> out = variance;
-  for (size_t i = 0; i < out.size(); ++i) out[i] = std::min(out[i], finiteFloat(kOutlier * usual[i]));
+  for (size_t i = 0; i < out.size(); ++i)
+    out[i] = std::min(out[i], finiteFloat(kOutlier * static_cast<double>(usual[i])));
   return out;
 }
 

@@ -156,12 +156,12 @@ void addRowScores(const Padded (&in)[2], const UncorrelatedInputs (&groups)[2], 
 Rgb<float> noiseLevels(const Rgb<float>& mean, const Rgb<float>& variance) {
   Rgb<float> out(mean.width(), mean.height(), kUnfilled);
   for (size_t c = 0; c < 3; ++c) {
-    const Plane<double> around = usualVariance(variance[c]);
+    const Plane<float> around = usualVariance(variance[c]);
     parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         const auto own = static_cast<double>(variance[c][i]);
         const bool established = kEstablished * own <= sqr(static_cast<double>(mean[c][i]));
-        out[c][i] = finiteFloat(established ? std::max(own, around[i]) : around[i]);
+        out[c][i] = established ? std::max(variance[c][i], around[i]) : around[i];
       }
     });
   }

@@ -191,6 +191,11 @@ TEST_CASE("What no method reads is not copied") {
   CHECK_FALSE(read("auto").history);
   CHECK(read("curves@nlm").history);
   CHECK_FALSE(read("box").features);
+  CHECK(read("uncorrelated").quarters);
+  CHECK(read("auto").quarters);  // fused with those of the photon map
+  Estimates alone = all;
+  alone.estimates.resize(1);
+  CHECK_FALSE(planesRead(makeRecipe(factsOf(alone), {"auto"}, {})).quarters);
 }
 
 TEST_CASE("Estimates fill their roles, and names override the rules") {

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
+#include "combiners/box_mean.h"
 #include "combiners/denoise/window.h"
-#include "renderer/film/box_sum.h"
 
 namespace braid {
 
@@ -35,14 +35,11 @@ void shrink(Plane<float>& v, double own, bool robust) {
       for (size_t i = begin; i < end; ++i) roots[i] = std::sqrt(std::sqrt(v[i]));
     });
   }
-  const Plane<double> box = boxSum(robust ? roots : v, kBoxRadius);
-  parallelRows(v.height, [&](int y) {
-    const int rows = patchCount(y, kBoxRadius, 0, v.height);
-    for (int x = 0; x < v.width; ++x) {
-      const double mean = box.at(x, y) / (rows * patchCount(x, kBoxRadius, 0, v.width));
-      const double prior = robust ? sqr(sqr(mean)) : mean;
-      float& value = v.at(x, y);
-      value = static_cast<float>((own * static_cast<double>(value) + kPriorWeight * prior) / (own + kPriorWeight));
+  const Plane<float> box = boxMean<float>(robust ? roots : v, kBoxRadius);
+  parallelChunks(v.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      const auto mean = static_cast<double>(box[i]), prior = robust ? sqr(sqr(mean)) : mean;
+      v[i] = static_cast<float>((own * static_cast<double>(v[i]) + kPriorWeight * prior) / (own + kPriorWeight));
     }
   });
 }

@@ -9,22 +9,24 @@
 namespace braid {
 
 // out[i] += in[i]
-inline void addValues(const double* __restrict in, int count, double* __restrict out) {
+template <class T>
+void addValues(const T* __restrict in, int count, T* __restrict out) {
   for (int i = 0; i < count; ++i) out[i] += in[i];
 }
 
 // out[i] = the sum of the n values from in[i] on, put together from sums of 1, 2, 4, … of them. `in` holds
 // count + n - 1 values and is overwritten, as is `spare`, of the same size.
-inline void windowSums(double* in, double* spare, int count, int n, double* out) {
-  std::fill_n(out, count, 0.0);
+template <class T>
+void windowSums(T* in, T* spare, int count, int n, T* out) {
+  std::fill_n(out, count, T(0));
   for (int power = 1, at = 0;; power *= 2) {
     if (n & power) {
       addValues(in + at, count, out);
       at += power;
     }
     if (2 * power > n) return;
-    const double* __restrict first = in, * __restrict second = in + power;
-    double* __restrict both = spare;
+    const T* __restrict first = in, * __restrict second = in + power;
+    T* __restrict both = spare;
     for (int i = 0; i < count + n - 2 * power; ++i) both[i] = first[i] + second[i];
     std::swap(in, spare);
   }

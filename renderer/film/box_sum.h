@@ -31,8 +31,8 @@ enum class WindowBorder { Clamped, Mirrored };
 
 namespace box_sum_detail {
 
-// The sums of one image for consecutive rows, from the first to the last of its blocks.
-template <class T>
+// The sums, of this type, of one image for consecutive rows, from the first to the last of its blocks.
+template <class T, class Sum>
 class BoxSummer {
  public:
   BoxSummer(const Plane<T>& in, int radius, WindowBorder border)
@@ -53,21 +53,23 @@ class BoxSummer {
   }
 
   // Block b holds the rows from b (2 radius + 1) - before on. The windows that end in it are those of out's rows.
-  void sum(int firstBlock, int lastBlock, double scale, Plane<double>& out) {
-    std::fill(tails_.begin(), tails_.end(), 0.0);
+  // finish(sum, x, y) is what becomes of the sum around a pixel.
+  template <class Finish>
+  void sum(int firstBlock, int lastBlock, const Finish& finish, Plane<Sum>& out) {
+    std::fill(tails_.begin(), tails_.end(), Sum(0));
     if (firstBlock > 0) {
       load(firstBlock - 1);
       makeTails();
     }
     for (int b = firstBlock; b < lastBlock; ++b) {
       load(b);
-      addHeads(b, scale, out);
+      addHeads(b, finish, out);
       makeTails();
     }
   }
 
  private:
-  double* row(std::vector<double>& of, int j) { return of.data() + static_cast<ptrdiff_t>(j) * width_; }
+  Sum* row(std::vector<Sum>& of, int j) { return of.data() + static_cast<ptrdiff_t>(j) * width_; }
 
   // The sums along x of the rows of a block.
   void load(int block) {
@@ -78,26 +80,26 @@ class BoxSummer {
       else if (before_ == 0 && y < in_.height)
         sumLine(y, row(rows_, j));
       else
-        std::fill_n(row(rows_, j), width_, 0.0);
+        std::fill_n(row(rows_, j), width_, Sum(0));
     }
   }
 
-  void sumLine(int y, double* out) {
+  void sumLine(int y, Sum* out) {
     const T* from = in_.data.data() + in_.index(0, y);
-    double* line = line_.data();
+    Sum* line = line_.data();
     for (int x = 0; x < radius_; ++x) {
-      line[x] = before_ > 0 ? static_cast<double>(from[mirrorIndex(x - radius_, width_)]) : 0.0;
-      line[radius_ + width_ + x] = before_ > 0 ? static_cast<double>(from[mirrorIndex(width_ + x, width_)]) : 0.0;
+      line[x] = before_ > 0 ? static_cast<Sum>(from[mirrorIndex(x - radius_, width_)]) : Sum(0);
+      line[radius_ + width_ + x] = before_ > 0 ? static_cast<Sum>(from[mirrorIndex(width_ + x, width_)]) : Sum(0);
     }
-    for (int x = 0; x < width_; ++x) line[radius_ + x] = static_cast<double>(from[x]);
+    for (int x = 0; x < width_; ++x) line[radius_ + x] = static_cast<Sum>(from[x]);
     windowSums(line, spare_.data(), width_, length_, out);
   }
 
   // tails_[j]: the sum of rows j and up of the block; row 0 is never asked for, as the whole block is all head then.
   void makeTails() {
     for (int j = length_ - 1; j > 0; --j) {
-      const double *in = row(rows_, j), *next = j + 1 < length_ ? row(tails_, j + 1) : nullptr;
-      double* tail = row(tails_, j);
+      const Sum *in = row(rows_, j), *next = j + 1 < length_ ? row(tails_, j + 1) : nullptr;
+      Sum* tail = row(tails_, j);
       if (next)
         for (int x = 0; x < width_; ++x) tail[x] = in[x] + next[x];
       else
@@ -105,43 +107,50 @@ class BoxSummer {
     }
   }
 
-  void addHeads(int block, double scale, Plane<double>& out) {
-    std::fill(heads_.begin(), heads_.end(), 0.0);
+  template <class Finish>
+  void addHeads(int block, const Finish& finish, Plane<Sum>& out) {
+    std::fill(heads_.begin(), heads_.end(), Sum(0));
     for (int j = 0; j < length_; ++j) {
-      const double* in = row(rows_, j);
+      const Sum* in = row(rows_, j);
       for (int x = 0; x < width_; ++x) heads_[static_cast<size_t>(x)] += in[x];
       const int y = block * length_ + j - before_ - radius_;
       if (y < 0 || y >= in_.height) continue;
-      double* to = out.data.data() + out.index(0, y);
-      if (j + 1 < length_) {
-        const double* tail = row(tails_, j + 1);
-        for (int x = 0; x < width_; ++x) to[x] = (tail[x] + heads_[static_cast<size_t>(x)]) * scale;
-      } else {
-        for (int x = 0; x < width_; ++x) to[x] = heads_[static_cast<size_t>(x)] * scale;
-      }
+      Sum* to = out.data.data() + out.index(0, y);
+      const Sum *tail = j + 1 < length_ ? row(tails_, j + 1) : nullptr, *head = heads_.data();
+      if (tail)
+        for (int x = 0; x < width_; ++x) to[x] = static_cast<Sum>(finish(tail[x] + head[x], x, y));
+      else
+        for (int x = 0; x < width_; ++x) to[x] = static_cast<Sum>(finish(head[x], x, y));
     }
   }
 
   const Plane<T>& in_;
   const int radius_, length_, before_, width_;
-  std::vector<double> line_, spare_;          // of a row and what its windows hold beside it
-  std::vector<double> rows_, tails_, heads_;  // of a block of rows
+  std::vector<Sum> line_, spare_;          // of a row and what its windows hold beside it
+  std::vector<Sum> rows_, tails_, heads_;  // of a block of rows
 };
 
 }  // namespace box_sum_detail
 
-// Sums over windows of (2 radius + 1)² pixels, times `scale`. The same bits for any number of threads.
-template <class T>
-Plane<double> boxSum(const Plane<T>& in, int radius, WindowBorder border = WindowBorder::Clamped, double scale = 1) {
-  Plane<double> out(in.width, in.height, kUnfilled);
+// finish(sum, x, y) for the sums over the windows of (2 radius + 1)² pixels around all (x, y), added in the type of
+// the result. The same bits for any number of threads.
+template <class Out, class T, class Finish>
+Plane<Out> finishedBoxSum(const Plane<T>& in, int radius, WindowBorder border, const Finish& finish) {
+  Plane<Out> out(in.width, in.height, kUnfilled);
   if (in.empty()) return out;
-  const int blocks = box_sum_detail::BoxSummer<T>::blocks(in.height, radius, border),
+  const int blocks = box_sum_detail::BoxSummer<T, Out>::blocks(in.height, radius, border),
             together = std::max(1, 64 / (2 * radius + 1));
   parallelChunks(static_cast<size_t>(blocks), static_cast<size_t>(together), [&](size_t begin, size_t end) {
-    box_sum_detail::BoxSummer<T> summer(in, radius, border);
-    runVectorised([&] { summer.sum(static_cast<int>(begin), static_cast<int>(end), scale, out); });
+    box_sum_detail::BoxSummer<T, Out> summer(in, radius, border);
+    runVectorised([&] { summer.sum(static_cast<int>(begin), static_cast<int>(end), finish, out); });
   });
   return out;
+}
+
+// The sums, times `scale`.
+template <class Out = double, class T>
+Plane<Out> boxSum(const Plane<T>& in, int radius, WindowBorder border = WindowBorder::Clamped, double scale = 1) {
+  return finishedBoxSum<Out>(in, radius, border, [scale](double sum, int /*x*/, int /*y*/) { return sum * scale; });
 }
 
 }  // namespace braid

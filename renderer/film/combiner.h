@@ -45,7 +45,7 @@ struct Needs {
   // photon maps.
   bool anyBases = false;
   bool quarters = false;      // of the unbiased (and the correlated) estimate
-  bool quartersHelp = false;  // works without, but worse
+  bool quartersHelp = false;  // reads few of their values, MethodInputs::quarters; works without, but worse
   bool features = false;      // works without, but worse
   bool featureNoise = false;  // of the features not only the means, also halves and variances
   int checkpoints = 0;
@@ -55,10 +55,18 @@ struct Needs {
   bool redenoise = false;  // the biased image must come from a denoiser, which is run again
 };
 
+// The quarters of an estimate in the units that they were given in, of which a copy in those of the method would take
+// longer than what is read.
+struct GivenQuarters {
+  const std::vector<Rgb<float>>* images = nullptr;  // four; null: there are none
+  double scale = 1;                                 // to the units of the method
+};
+
 // The inputs of one method. Pointers that needs() does not ask for may be null. Widths and heights agree.
 struct MethodInputs {
   const Estimate* unbiased = nullptr;  // mean, halves, variance
   Estimate* expendable = nullptr;      // the same, if nobody reads it afterwards: a method may change it
+  GivenQuarters quarters;              // of the unbiased estimate
   const Estimate* biased = nullptr;    // mean, halves; variance and bias where known
   std::vector<const Estimate*> bases;
   const Estimate* correlated = nullptr;
