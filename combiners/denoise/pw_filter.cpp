@@ -36,7 +36,7 @@ class TileFilter {
       for (auto& image : column.patchRows) image.fill(zeros);
       column.inverseCount = column.weight = column.edge = zeros;
     }
-    differences_.fill(zeros);
+    differences_.fill(PixelBuffer<float>(zeros.size() + kRowUnit, 0.0f));
     ofFirst_.reserve(columns_.size());
     ofSecond_.reserve(columns_.size());
     startAtCentre();
@@ -131,6 +131,9 @@ class TileFilter {
                                         (2 * kPatchWelchSpatialSd * kPatchWelchSpatialSd));
   }
 
+  // A row of z²; the sums over three read the value before the first, too.
+  float* differencesOf(size_t image) { return differences_[image].data() + kRowUnit; }
+
   // Row y of z², summed over three neighbours in x, of every image; zeros outside the image.
   void patchRow(Column& column, int y, int dx, int dy) {
     const PixelRect &p = column.p, &pairs = column.pairs;
@@ -143,12 +146,12 @@ class TileFilter {
     const int first = x0 / kRowUnit * kRowUnit, last = wholeVectors(x1);
     const ptrdiff_t at = tileIndex(first, y), to = tileIndex(first + dx, y + dy);
     std::array<float*, PatchWelchInput::kMaxImages> rows{};
-    for (size_t i = 0; i < images_; ++i) rows[i] = differences_[i].data() + first;
+    for (size_t i = 0; i < images_; ++i) rows[i] = differencesOf(i) + first;
     images_ == 3 ? differenceRows<3>(tile_, at, to, last - first, rows.data())
                  : differenceRows<1>(tile_, at, to, last - first, rows.data());
     for (size_t i = 0; i < images_; ++i) {
-      float* z2 = differences_[i].data();
-      std::fill(z2 + std::max(first - 1, 0), z2 + x0, 0.0f);
+      float* z2 = differencesOf(i);
+      std::fill(z2 + first - 1, z2 + x0, 0.0f);
       std::fill(z2 + x1, z2 + last + 1, 0.0f);
       boxRow(z2 + column.begin, count, column.patchRow(i, y));
     }
