@@ -141,7 +141,7 @@ inline void addFeaturePair(const ChannelRow& p, const ChannelRow& q, int count, 
   for (int x = 0; x < count; ++x)
     addFeature<kCoarse>(excess(up[x] - uq[x], vp[x], vq[x]), larger(sp[x], kFineFloor) + larger(sq[x], kFineFloor),
                         larger(sp[x], kCoarseFloor) + larger(sq[x], kCoarseFloor), outFine[x],
-                        outCoarse[kCoarse ? x : 0]);
+                        (kCoarse ? outCoarse : outFine)[x]);
 }
 
 template <bool kCoarse>
@@ -155,7 +155,7 @@ inline void addFeatureMean(const ChannelRow& p, const ChannelRow& q, const Chann
         excess(up[x] - 0.5f * (uq[x] + ur[x]), vp[x], vq[x], vr[x]),
         larger(sp[x], kFineFloor) + share * (larger(sq[x], kFineFloor) + larger(sr[x], kFineFloor)),
         larger(sp[x], kCoarseFloor) + share * (larger(sq[x], kCoarseFloor) + larger(sr[x], kCoarseFloor)), outFine[x],
-        outCoarse[kCoarse ? x : 0]);
+        (kCoarse ? outCoarse : outFine)[x]);
 }
 
 // The rows of p, q and r for a triple; with Spread::Own, the neighbours are given the spread of p.
