@@ -347,7 +347,7 @@ inline std::string badPlanes(const MethodResult& r) {
 // Same sizes and same bits.
 inline bool identical(const Plane<float>& a, const Plane<float>& b) {
   return a.width == b.width && a.height == b.height &&
-         std::memcmp(a.data.data(), b.data.data(), a.size() * sizeof(float)) == 0;
+         (a.empty() || std::memcmp(a.data.data(), b.data.data(), a.size() * sizeof(float)) == 0);
 }
 inline bool identical(const Rgb<float>& a, const Rgb<float>& b) {
   return identical(a[0], b[0]) && identical(a[1], b[1]) && identical(a[2], b[2]);
