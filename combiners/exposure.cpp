@@ -177,6 +177,7 @@ Estimates normalised(const Estimates& all, double k, SanitiseReport& report, con
   if (read.history)
     for (const auto& [name, checkpoints] : all.history)
       for (const Checkpoint& c : checkpoints) out.history[name].push_back(changed(c, k, report));
+  if (read.reference) out.reference = changed(all.reference, colours(k), report);
   if (!all.features || !read.features) return out;
   Features& features = out.features.emplace();
   features.albedo = changed(all.features->albedo, read.featureNoise, report);

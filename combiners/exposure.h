@@ -33,6 +33,7 @@ struct SanitiseReport {
 struct PlanesRead {
   bool quarters = true, history = true;
   bool features = true, featureNoise = true;  // the noise: halves and variances
+  bool reference = true;
 };
 
 // The estimates as methods see them. Non-finite values and negative variances become 0. Colours and biases are

@@ -42,6 +42,8 @@ bool sizeIs(const Rgb<float>& image, const Estimates& e) {
 }
 
 void checkSizes(const Estimates& all) {
+  if (!sizeIs(all.reference, all))
+    throw Error(ExitCode::BadInput, fmt::format("the reference is not of the size {}x{}", all.width, all.height));
   for (const Estimate& e : all.estimates) {
     bool ok = !e.mean.empty() && sizeIs(e.variance, all) && sizeIs(e.bias, all) && sizeIs(e.biasVariance, all);
     for (const Rgb<float>* image : {&e.mean, &e.half[0], &e.half[1]}) ok = ok && sizeIs(*image, all);
@@ -142,6 +144,7 @@ MethodInputs Runner::inputsOf(const Step& step) const {
   in.correlated = estimate(step.correlated);
   for (const std::string& base : step.bases) in.bases.push_back(estimate(base));
   in.features = features_;
+  if (!all_.reference.empty()) in.reference = &all_.reference;
   const Estimate* given = step.kept == 0 ? given_->find(step.unbiased) : nullptr;
   if (given && given->quarter.size() == 4) in.quarters = {&given->quarter, result.exposure};
   const auto history = all_.history.find(step.unbiased);
@@ -247,7 +250,10 @@ PlanesRead planesRead(const Recipe& recipe) {
     const Needs of = step.method->needs();
     return step.obstacle.empty() && (of.quarters || (of.quartersHelp && !step.bases.empty()));
   });
-  return {quarters, needs.checkpoints > 0 || !needs.stops.empty(), needs.features, needs.featureNoise};
+  const bool reference = std::any_of(recipe.steps.begin(), recipe.steps.end(), [](const Step& step) {
+    return step.obstacle.empty() && step.method->needs().reference;
+  });
+  return {quarters, needs.checkpoints > 0 || !needs.stops.empty(), needs.features, needs.featureNoise, reference};
 }
 
 PipelineResult runPipeline(const Estimates& estimates, const std::vector<std::string>& wanted,

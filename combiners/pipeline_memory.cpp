@@ -51,7 +51,7 @@ MethodMemory memoryOf(const Step& step, const Recipe& recipe, const Facts& facts
 int colourMemory(const Facts& facts) {
   int bytes = 0;
   for (const EstimateFacts& e : facts.estimates) bytes += imagesOf(e) + historyOf(e);
-  return bytes;
+  return facts.reference ? bytes + kColour : bytes;
 }
 
 // With the mean, two halves and the variance.
@@ -64,6 +64,7 @@ Facts copiedFacts(Facts facts, const PlanesRead& read) {
     e.checkpoints = 0;
     e.kept.clear();
   }
+  facts.reference &= read.reference;
   return facts;
 }
 
@@ -74,7 +75,7 @@ int estimatesMemory(const Facts& facts) { return colourMemory(facts) + (facts.fe
 uint64_t pipelineMemory(const Recipe& recipe, const Facts& given, uint64_t pixels, int threads) {
   const Facts facts = copiedFacts(given, planesRead(recipe));
   const int copy = colourMemory(facts);  // features are read as they are, unless they have bad values
-  uint64_t kept = 0, peak = 0;  // bytes
+  uint64_t kept = 0, peak = 0;           // bytes
   for (const Step& step : recipe.steps) {
     if (!step.obstacle.empty()) continue;
     const MethodMemory memory = memoryOf(step, recipe, facts);

@@ -92,6 +92,8 @@ void RecipeMaker::fill(Step& step, const std::string& chosen) {
   const bool takesBases = needs.bases > 0 || needs.anyBases;
   if (const auto* outside = dynamic_cast<const OutsideMethod*>(step.method.get())) step.obstacle = outside->obstacle();
   if (step.obstacle.empty()) step.obstacle = fillUnbiased(step);
+  if (step.obstacle.empty() && needs.reference && !facts_.reference)
+    step.obstacle = "needs a reference: combine --reference FILE, or a sweep";
   if (step.obstacle.empty() && needs.correlated) step.obstacle = fillCorrelated(step);
   if (step.obstacle.empty() && needs.biased) step.obstacle = fillBiased(step, chosen);
   if (step.obstacle.empty() && !needs.biased && !takesBases && !chosen.empty())
@@ -289,6 +291,7 @@ const EstimateFacts* Facts::find(const std::string& name) const {
 Facts factsOf(const Estimates& all) {
   Facts facts;
   facts.features = all.features.has_value();
+  facts.reference = !all.reference.empty();
   for (const Estimate& e : all.estimates) {
     const auto history = all.history.find(e.name);
     std::vector<uint64_t> kept;

@@ -58,6 +58,7 @@ struct EstimateFacts {
 struct Facts {
   std::vector<EstimateFacts> estimates;
   bool features = false;
+  bool reference = false;
   const EstimateFacts* find(const std::string& name) const;
 };
 Facts factsOf(const Estimates& estimates);

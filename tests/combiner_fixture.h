@@ -296,6 +296,7 @@ inline MethodInputs inputsOf(const Case& c, const std::string& biased = "sppm") 
   in.bases.push_back(&c.sppm());
   in.correlated = &c.crn();
   in.features = c.estimates.features ? &*c.estimates.features : nullptr;
+  in.reference = &c.truth;
   const auto history = c.estimates.history.find("pt");
   if (history != c.estimates.history.end()) in.history = &history->second;
   in.seed = c.estimates.seed;

@@ -34,10 +34,11 @@ inline CaseOptions sized(int width, int height, uint64_t samples = 16) {
   return o;
 }
 
-// Everything that a method may need: pt with history, crn, sppm, and two denoised images as bases.
+// Everything that a method may need: pt with history, crn, sppm, two denoised images as bases, and the truth.
 inline Estimates everything(const Case& c) {
   Estimates e = c.estimates;
   for (const Estimate& d : c.denoised) e.estimates.push_back(d);
+  e.reference = c.truth;
   return e;
 }
 

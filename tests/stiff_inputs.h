@@ -15,9 +15,8 @@
 #include <vector>
 
 #include "combiners/exposure.h"
-#include "combiners/outside_method.h"
 #include "combiners/registry.h"
-#include "tests/combiner_fixture.h"
+#include "tests/every_method.h"
 
 namespace braid::test {
 
@@ -278,21 +277,12 @@ inline std::vector<StiffCase> stiffCases() {
   return list;
 }
 
-// The methods that can run here: without those that want a file or a library.
-inline std::vector<std::shared_ptr<const Method>> stiffMethods() {
-  std::vector<std::shared_ptr<const Method>> list;
-  for (auto& m : makeMethods()) {
-    const auto* outside = dynamic_cast<const OutsideMethod*>(m.get());
-    if (!outside || outside->obstacle().empty()) list.push_back(std::move(m));
-  }
-  return list;
-}
-
 // A case as methods see it: sanitised, exposure-normalised and limited, as the pipeline does it.
 class StiffInputs {
  public:
   explicit StiffInputs(const StiffCase& s) : all_(s.c.estimates), replaces_(s.replacesBiased) {
     for (const Estimate& d : s.c.denoised) all_.estimates.push_back(d);
+    all_.reference = s.c.truth;
     exposure_ = exposureScale(all_.find("pt")->mean);
     SanitiseReport report;
     all_ = normalised(all_, exposure_, report);
@@ -324,6 +314,7 @@ class StiffInputs {
     if (std::string(m.name()) == "auto") in.bases = {all_.find("sppm")};  // as the recipe does without named denoisers
     in.correlated = &correlated();
     in.features = features && all_.features ? &*all_.features : nullptr;
+    in.reference = &all_.reference;
     in.history = &all_.history.at("pt");
     in.seed = all_.seed;
     const Estimate* y = in.biased;

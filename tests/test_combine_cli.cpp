@@ -262,6 +262,26 @@ TEST_CASE("Two renders of another renderer are halves, with a variance from thei
   CHECK(readImage(folder.path / "mean.exr").rgb()[0][0] == doctest::Approx(1.125));
 }
 
+TEST_CASE("A reference file is what the best choice in hindsight goes by") {
+  const Folder folder;
+  rendered(folder, "--float -o noisy.exr");
+  const auto image = [&](const std::string& arguments) {
+    const Run run = braidRun(folder, "combine -q --float --unbiased noisy.exr -o o.exr " + arguments);
+    INFO(run.err);
+    REQUIRE(run.code == 0);
+    fs::copy_file(folder.path / "o.exr", folder.path / "last.exr", fs::copy_options::overwrite_existing);
+    return readImage(folder.path / "o.exr").rgb();
+  };
+  const Rgb<float> noisy = readImage(folder.path / "noisy.exr").rgb(), box = image("--method box");
+  const Rgb<float> likeBox = image("--method ideal@box --reference last.exr"),
+                   likeNoisy = image("--method ideal@box --reference noisy.exr");
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t i = 0; i < box.size(); ++i) {
+      CHECK(likeBox[c][i] == doctest::Approx(box[c][i]).epsilon(1e-5));
+      CHECK(likeNoisy[c][i] == doctest::Approx(noisy[c][i]).epsilon(1e-5));
+    }
+}
+
 TEST_CASE("Errors of combining end with their exit codes and one line") {
   const Folder folder;
   writeChannels(folder.path / "a.exr", {"R", "G", "B"});
@@ -286,6 +306,9 @@ TEST_CASE("Errors of combining end with their exit codes and one line") {
 
   rendered(folder, "-o big.exr");
   refused("combine --unbiased big.exr --biased a.exr --method inverse-variance -o o.exr", 2, "12x10 pixels");
+  refused("combine --unbiased big.exr --method ideal@box -o o.exr", 2, "needs a reference: combine --reference FILE");
+  refused("combine --unbiased big.exr --reference a.exr --method ideal@box -o o.exr", 2, "a.exr: 12x10 pixels");
+  refused(render + "--combine ideal@box", 1, "needs a reference");
   refused("combine --unbiased big.exr:bdpt --method box -o o.exr", 2, "no estimate 'bdpt': it has pt");
 }
 

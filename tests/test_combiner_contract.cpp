@@ -106,6 +106,7 @@ TEST_CASE("Every method ends soon after it is told to") {
       in.biased = many.find("narrow");
       in.correlated = many.find("crn");
       in.features = &*many.features;
+      in.reference = &many.reference;
       in.history = &many.history.at("pt");
       in.bases = {many.find("narrow"), many.find("wide")};
       in.redenoise = [](const Rgb<float>& image) { return image; };
@@ -159,6 +160,7 @@ TEST_CASE("What a method does not ask for does not change its image") {
     for (Estimate& x : e.estimates) x.quarter.clear();
   });
   const Estimates noHistory = without([](Estimates& e) { e.history.clear(); });
+  const Estimates noReference = without([](Estimates& e) { e.reference = {}; });
   // The method as it is called here may want more than alone: its input's denoiser reads what it needs.
   for (const auto& m : runnableMethods()) {
     CAPTURE(std::string(m->name()));
@@ -168,6 +170,7 @@ TEST_CASE("What a method does not ask for does not change its image") {
     if (!needs.featureNoise) CHECK(sameBits(outputOf(*m, noNoise).result, whole));
     if (!needs.quarters && !needs.quartersHelp) CHECK(sameBits(outputOf(*m, noQuarters).result, whole));
     if (needs.checkpoints == 0) CHECK(sameBits(outputOf(*m, noHistory).result, whole));
+    if (!needs.reference) CHECK(sameBits(outputOf(*m, noReference).result, whole));
   }
 }
 
@@ -203,7 +206,8 @@ TEST_CASE("From files every method makes what it makes in process") {
   options.quarters = options.history = true;
   e.attributes = estimateAttributes(e);
   writeExr(path, e, e.estimates[0].mean, nullptr, options);
-  const Estimates read = readEstimates(readImage(path));
+  Estimates read = readEstimates(readImage(path));
+  read.reference = e.reference;  // a file of its own
   REQUIRE(read.estimates.size() == e.estimates.size());
   for (const auto& m : runnableMethods()) {
     CAPTURE(std::string(m->name()));

@@ -35,6 +35,7 @@ void spoil(Rgb<float>& image, size_t offset) {
 Estimates spoiled(const Case& c) {
   Estimates e = everything(c);
   size_t offset = 0;
+  spoil(e.reference, offset++);
   for (Estimate& x : e.estimates) {
     spoil(x.mean, offset++);
     for (Rgb<float>& half : x.half) spoil(half, offset++);

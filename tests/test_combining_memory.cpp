@@ -32,6 +32,7 @@ MethodInputs inputsOf(const Case& c, const std::vector<const char*>& bases) {
   in.correlated = &c.crn();
   in.biased = &c.find("narrow");
   in.features = &*c.estimates.features;
+  in.reference = &c.truth;
   in.history = &c.estimates.history.at("pt");
   in.redenoise = [](const Rgb<float>& image) { return image; };
   for (const char* name : bases) in.bases.push_back(&c.find(name));
@@ -77,10 +78,11 @@ TEST_CASE("every method states its memory to 10 %") {
 }
 
 TEST_CASE("the pipeline takes the memory that follows from a recipe") {
-  const Case c = caseOf(16);
+  Case c = caseOf(16);
+  c.estimates.reference = c.truth;
   const Facts facts = factsOf(c.estimates);
-  for (const std::vector<std::string>& wanted :
-       std::vector<std::vector<std::string>>{{"auto"}, {"js@nfor"}, {"ensemble@pw+nlm+rdfc"}, {"curves@nlm"}}) {
+  for (const std::vector<std::string>& wanted : std::vector<std::vector<std::string>>{
+           {"auto"}, {"js@nfor"}, {"ensemble@pw+nlm+rdfc"}, {"curves@nlm"}, {"ideal@pw"}}) {
     const uint64_t stated = pipelineMemory(makeRecipe(facts, wanted, {}), facts, kWidth * kHeight, kThreads);
     const int64_t before = heapBytes();
     resetHeapPeak();

@@ -16,7 +16,7 @@ namespace {
 // pt and crn with everything, and sppm.
 Facts fullFacts() {
   Facts f;
-  f.features = true;
+  f.features = f.reference = true;
   f.estimates = {{"pt", true, Correlation::Independent, 64, true, true, true, 7},
                  {"crn", true, Correlation::CommonRandomNumbers, 64, true, true, true, 7},
                  {"sppm", false, Correlation::Independent, 64, true, true, true, 7}};
@@ -283,6 +283,7 @@ TEST_CASE("What cannot run names what is missing, for every registered method") 
     expect(needs.variance, without([](Facts& f) { f.estimates[0].variance = false; }), "variance of pt");
     expect(needs.quarters, without([](Facts& f) { f.estimates[0].quarters = false; }), "quarter buffers of pt");
     expect(needs.correlated, without([](Facts& f) { f.estimates.erase(f.estimates.begin() + 1); }), "correlated");
+    expect(needs.reference, without([](Facts& f) { f.reference = false; }), "needs a reference");
     if (needs.checkpoints > 0) expect(true, without([](Facts& f) { f.estimates[0].checkpoints = 0; }), "checkpoint");
     if (needs.passes > 1)
       expect(true, without([&](Facts& f) { f.estimates[0].passes = needs.passes - 1; }), "passes of pt");

@@ -62,7 +62,7 @@ SweepMethod boxMethod() {
   SweepMethod m;
   m.name = "box3";
   m.inputs = {{"pt", 1}};
-  m.finish = [](const std::shared_ptr<const Estimates>& estimates) {
+  m.finish = [](const std::shared_ptr<const Estimates>& estimates, const Rgb<float>&) {
     const Rgb<float>& in = estimates->find("pt")->mean;
     MethodImage out{Rgb<float>(in.width(), in.height()), 0.25, 0.125, "", {}};
     for (int y = 0; y < in.height(); ++y)

@@ -92,13 +92,16 @@ TEST_CASE("Claims hold or not by their cells, and say when nothing was measured"
   const SweepTable t = tableOf({{"room", "pt", 16, 1, 0.4},
                                 {"room", "js@nfor", 16, 1, 0.2},
                                 {"room", "pt/auto", 16, 1, 0.1},
+                                {"room", "ensemble@nfor+rdfc", 16, 1, 0.3},
+                                {"room", "ensemble-oracle@nfor+rdfc", 16, 1, 0.15},
                                 {"pool", "pt", 16, 1, 8},
                                 {"pool", "js@nfor", 16, 1, 9},
                                 {"pool", "bdpt", 16, 1, 4},
                                 {"pool", "sppm", 16, 1, 0.1},
                                 {"pool", "bdpt+sppm/auto", 16, 1, 0.12}});
-  const SweepSummary summary =
-      summarise(t, {"room", "pool"}, {"pt", "js@nfor", "pt/auto", "bdpt", "sppm", "bdpt+sppm/auto"});
+  const SweepSummary summary = summarise(t, {"room", "pool"},
+                                         {"pt", "js@nfor", "pt/auto", "bdpt", "sppm", "bdpt+sppm/auto",
+                                          "ensemble@nfor+rdfc", "ensemble-oracle@nfor+rdfc"});
   CHECK(knowsPapers(summary));
   CHECK(!knowsPapers(summarise(t, {"room"}, {"pt"})));
   const std::vector<ReplicateBias> biases{{"room", "uncorrelated", 2, 1e-5, 1e-6, 1e-3},
@@ -134,6 +137,10 @@ TEST_CASE("Claims hold or not by their cells, and say when nothing was measured"
   REQUIRE(missing);
   CHECK(missing->measured == "not measured");
   CHECK(!missing->holds);
+  const PaperClaim* left = findClaim(sections, "best in hindsight");
+  REQUIRE(left);
+  CHECK(left->measured.find("geometric mean 0.5x, from 0.5x to 0.5x (room, 16 spp)") == 0);
+  CHECK(!left->holds);
   const std::string html = toHtml(sections), markdown = toMarkdown(sections);
   CHECK(html.find("not measured") != std::string::npos);
   CHECK(markdown.find("| no |") != std::string::npos);

@@ -19,7 +19,7 @@ namespace braid {
 namespace {
 
 struct CombineOptions {
-  std::string unbiased, correlated, output, png, aovs = "all";
+  std::string unbiased, correlated, reference, output, png, aovs = "all";
   CombineChoice choice;
   uint64_t samplesPerPixel = 0;
   double exposure = 0;
@@ -64,6 +64,14 @@ Estimates readBiased(const std::string& text, const ReadOptions& options) {
   return all;
 }
 
+Rgb<float> readReferenceImage(const std::string& file, const Estimates& all) {
+  ImageFile image = readImage(file);
+  if (image.width != all.width || image.height != all.height)
+    throw Error(ExitCode::BadInput, fmt::format("{}: {}x{} pixels, but the unbiased image has {}x{}", file, image.width,
+                                                image.height, all.width, all.height));
+  return image.rgb("");
+}
+
 // Fills the roles of the pipeline from the options; files become estimates.
 Estimates readInputs(const CombineOptions& o, PipelineOptions& pipeline, std::vector<std::string>& notes) {
   ReadOptions read{"unbiased", ImageRole::Noisy, o.samplesPerPixel, &notes};
@@ -92,6 +100,7 @@ Estimates readInputs(const CombineOptions& o, PipelineOptions& pipeline, std::ve
         addEstimate(all, readBiased(biased, read), biased, [](const Estimate& e) { return !e.unbiased; });
     all.estimates.back().unbiased = false;
   }
+  if (!o.reference.empty()) all.reference = readReferenceImage(o.reference, all);
   for (std::string& base : pipeline.roles.bases)
     if (!all.find(base) && base.find(':') == std::string::npos && isFile(base)) base = "external:" + base;
   return all;
@@ -169,6 +178,8 @@ void addCombine(CLI::App& app, Action& action) {
                    "FILE,HALFA,HALFB")
       ->required();
   command->add_option("--correlated", o.correlated, "The same, for the estimate by common random numbers or gradients");
+  command->add_option("--reference", o.reference,
+                      "Image that the true errors are measured by, for ideal and ensemble-oracle");
   command
       ->add_option("--method", o.choice.combine, "Methods to run, separated by commas; the last one is the image R G B")
       ->required();

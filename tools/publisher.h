@@ -68,8 +68,8 @@ class Publisher {
   // For Session::run(): the published error met the target.
   const std::atomic<bool>& reached() const { return reached_; }
 
-  // What was published on the way has taken of the whole machine, in seconds: holding up the passes, and the work beside
-  // them.
+  // What was published on the way has taken of the whole machine, in seconds: holding up the passes, and the work
+  // beside them.
   double spent() const { return schedule_.spent(); }
 
   // After the run: saves the state and the final image, for which the film makes room. Both are tried; throws

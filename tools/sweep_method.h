@@ -28,7 +28,8 @@ struct MethodImage {
 };
 
 // A method. Without `finish` it is an integrator, and its image is the mean of its only input. The estimates that
-// `finish` gets may hold more integrators than the inputs: find() them by name.
+// `finish` gets may hold more integrators than the inputs: find() them by name. It also gets the mean of the scene's
+// reference, for methods that are only there to compare with.
 struct SweepMethod {
   std::string name;
   // The first one is the estimate that the method improves: its passes are the row's spp, and pixels count as better
@@ -36,7 +37,7 @@ struct SweepMethod {
   std::vector<MethodShare> inputs;
   bool features = false, quarters = false, history = false;  // what the estimates must hold
   std::vector<uint64_t> stops;                               // passes at which they keep their image
-  std::function<MethodImage(const std::shared_ptr<const Estimates>&)> finish;
+  std::function<MethodImage(const std::shared_ptr<const Estimates>&, const Rgb<float>& reference)> finish;
 };
 
 // One method for every integrator.

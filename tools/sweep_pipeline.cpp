@@ -40,8 +40,9 @@ class SharedPipeline {
   const std::vector<MethodShare>& inputs() const { return inputs_; }
   void want(const std::string& method) { wanted_.push_back(method); }
 
-  MethodImage image(const std::shared_ptr<const Estimates>& estimates, const std::string& method) {
-    if (estimates != estimates_) run(estimates);
+  MethodImage image(const std::shared_ptr<const Estimates>& estimates, const Rgb<float>& reference,
+                    const std::string& method) {
+    if (estimates != estimates_) run(estimates, reference);
     const PipelineOutput* output = result_.find(method);
     MethodImage made;
     if (!output || !output->ran()) {
@@ -58,8 +59,9 @@ class SharedPipeline {
 
  private:
   // Without the estimates that other methods brought in: roles are filled from what there is.
-  void run(const std::shared_ptr<const Estimates>& estimates) {
+  void run(const std::shared_ptr<const Estimates>& estimates, const Rgb<float>& reference) {
     Estimates own = *estimates;
+    own.reference = reference;
     const auto foreign = [&](const Estimate& e) {
       return std::none_of(inputs_.begin(), inputs_.end(), [&](const MethodShare& i) { return i.integrator == e.name; });
     };
@@ -138,7 +140,7 @@ Parsed parse(const std::string& name, const Integrators& integrators) {
       list.push_back(*correlated);
   }
   Facts facts;
-  facts.features = true;
+  facts.features = facts.reference = true;
   for (const Integrator* i : list) {
     facts.estimates.push_back(factsOf(*i));
     parsed.inputs.push_back({i->name(), 1});
@@ -176,8 +178,9 @@ std::vector<SweepMethod> sweepMethods(const std::vector<std::string>& names, con
     method.quarters = parsed.needs.quarters;
     method.history = parsed.needs.checkpoints > 0;
     method.stops = parsed.needs.stops;
-    method.finish = [pipeline, wanted = parsed.method](const std::shared_ptr<const Estimates>& estimates) {
-      return pipeline->image(estimates, wanted);
+    method.finish = [pipeline, wanted = parsed.method](const std::shared_ptr<const Estimates>& estimates,
+                                                       const Rgb<float>& reference) {
+      return pipeline->image(estimates, reference, wanted);
     };
     known.push_back(std::move(method));
   }

@@ -48,7 +48,7 @@ void evaluate(const SweepScene& scene, const SweepJob& job, const SweepJob::Cell
   row.spp = first.passes;
   MethodImage made;
   if (method.finish) {
-    made = method.finish(estimates);
+    made = method.finish(estimates, scene.reference.image.mean);
   } else {
     made.image = first.mean;
     if (first.passes > 1) made.error = relativeError(errorMap(first), first.mean);

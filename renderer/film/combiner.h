@@ -53,6 +53,7 @@ struct Needs {
   bool halves = true;      // of the unbiased and the biased image and the bases; false: works on the means alone
   bool variance = true;    // of the unbiased estimate; false: works without
   bool redenoise = false;  // the biased image must come from a denoiser, which is run again
+  bool reference = false;  // the image that is to be estimated: for comparisons only, no render has it
 };
 
 // The quarters of an estimate in the units that they were given in, of which a copy in those of the method would take
@@ -71,6 +72,7 @@ struct MethodInputs {
   std::vector<const Estimate*> bases;
   const Estimate* correlated = nullptr;
   const Features* features = nullptr;
+  const Rgb<float>* reference = nullptr;
   const std::vector<Checkpoint>* history = nullptr;  // of the unbiased estimate, oldest first
   // Runs the denoiser that made `biased` on another colour image, everything else unchanged.
   std::function<Rgb<float>(const Rgb<float>&)> redenoise;

@@ -80,6 +80,8 @@ struct Estimates : EstimatesHead {
   std::vector<Attribute> attributes;
   // By name of the estimate: its earlier states at rounds 1, 2, 4, …, oldest first; none unless asked for.
   std::map<std::string, std::vector<Checkpoint>> history;
+  // The image that all of them estimate, where it is known: for methods that show how good a choice could be.
+  Rgb<float> reference;
 
   const Estimate* find(const std::string& name) const {
     for (const Estimate& e : estimates)

@@ -17,8 +17,10 @@ namespace {
 constexpr const char *kUncorrelated = "uncorrelated", *kUniform = "uncorrelated-uniform",
                      *kCross = "uncorrelated-cross";
 constexpr const char *kDouble = "bdpt+sppm/double-shrinkage@sppm", *kSingle = "bdpt+sppm/js@sppm";
-constexpr const char *kEnsemble = "ensemble@nfor+rdfc", *kAverage = "average@nfor+rdfc";
-constexpr const char *kCurves = "curves@nfor", *kEasy = "easy@nfor", *kInverse = "inverse-variance@nfor";
+constexpr const char *kEnsemble = "ensemble@nfor+rdfc", *kAverage = "average@nfor+rdfc",
+                     *kOracle = "ensemble-oracle@nfor+rdfc";
+constexpr const char *kCurves = "curves@nfor", *kEasy = "easy@nfor", *kInverse = "inverse-variance@nfor",
+                     *kIdeal = "ideal@nfor";
 constexpr const char* kStopped = "curves:32@nfor";
 constexpr double kStop = 32;
 constexpr const char *kAuto = "pt/auto", *kAutoPhotons = "bdpt+sppm/auto";
@@ -46,6 +48,8 @@ class Comparison {
   static PaperClaim claim(const std::string& text, const CellComparison& c, double limit, double share);
   // Holds when the geometric mean is below the limit.
   static PaperClaim onAverage(const std::string& text, const CellComparison& c, double limit);
+  // What is left to gain, of which nothing is claimed.
+  static PaperClaim figure(const std::string& text, const CellComparison& c);
   PaperClaim biasClaim() const;
   CellComparison sinceStop() const;
   bool keepsPhotons(const std::string& scene) const {
@@ -86,6 +90,14 @@ PaperClaim Comparison::onAverage(const std::string& text, const CellComparison& 
   PaperClaim result{text, describe(c, limit), {}};
   if (!c.cells.empty()) result.holds = c.geometricMean() < limit;
   return result;
+}
+
+PaperClaim Comparison::figure(const std::string& text, const CellComparison& c) {
+  if (c.cells.empty()) return {text, "not measured", {}};
+  return {text,
+          fmt::format("geometric mean {}x, from {}x to {}x ({}, {:g} spp)", shortNumber(c.geometricMean()),
+                      shortNumber(c.best()), shortNumber(c.worst().ratio), c.worst().scene, c.worst().spp),
+          {}};
 }
 
 PaperSection Comparison::jamesStein() const {
@@ -161,6 +173,8 @@ PaperSection Comparison::ensemble() const {
                              cells_.compare(kEnsemble, {other}, 4), 1.0, 0.5));
   s.claims.push_back(
       claim("Less error than the plain mean in most cells", cells_.compare(kEnsemble, {kAverage}, 4), 1.0, 0.5));
+  s.claims.push_back(figure("Weights that are best in hindsight, by a reference: their error over the ensemble's",
+                            cells_.compare(kOracle, {kEnsemble}, 4)));
   return s;
 }
 
@@ -186,6 +200,8 @@ PaperSection Comparison::curves() const {
                 sinceStop(), 1.0));
   s.claims.push_back(claim("Converges: at the most samples nowhere more error than path tracing",
                            cells_.compare(kCurves, {"pt"}, 16, {}, true), 1.0, 1.0));
+  s.claims.push_back(figure("Ideal blending, by a reference in every pixel: its error over the curves'",
+                            cells_.compare(kIdeal, {kCurves}, 16)));
   return s;
 }
 
@@ -262,8 +278,8 @@ const char* verdict(const PaperClaim& c) { return !c.holds ? "–" : *c.holds ? 
 std::vector<std::string> paperMethods() {
   std::vector<std::string> methods{"pt", "bdpt", "sppm", "crn", "vcm", "nfor", "rdfc", "box"};
   for (const std::string& biased : kShrunk) methods.push_back(shrunk(biased));
-  for (const char* name : {kUncorrelated, kUniform, kCross, kDouble, kSingle, kEnsemble, kAverage, kCurves, kEasy,
-                           kInverse, kStopped, kAuto, kAutoPhotons})
+  for (const char* name : {kUncorrelated, kUniform, kCross, kDouble, kSingle, kEnsemble, kAverage, kOracle, kCurves,
+                           kEasy, kInverse, kStopped, kIdeal, kAuto, kAutoPhotons})
     methods.push_back(name);
   methods.insert(methods.end(), kOneHots.begin(), kOneHots.end());
   return methods;
