@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "combiners/denoise/alike_range.h"
 #include "combiners/denoise/feature_prefilter.h"
 #include "combiners/denoise/nlm_filter.h"
 #include "combiners/denoise/nlm_window_weights.h"
@@ -23,7 +24,7 @@ constexpr int kVarianceWindow = 5, kVariancePatch = 1;
 constexpr double kRidge = 1e-3;
 constexpr float kScaleOffset = 0.1f;
 constexpr float kFallbackWeight = 0.25f;  // of the zero-order filter, where there is not a model for every pixel
-constexpr int kRange = 1;                 // pixels on each side
+constexpr int kRange = 1;                 // radius of the range of fits
 constexpr float kLeastDivisor = 0.2f;     // added to the albedo
 
 // The image of value(channel, pixel); values that are not finite are 0.
@@ -100,27 +101,13 @@ Rgb<float> guideVariance(const Colours& colours, uint64_t passes, NforVariance k
   return regularisedVariance(e);
 }
 
-// Limits every value to the range of the image's in the pixels about it. Beside a small bright highlight, whose pixels
-// look like anything because they are so noisy, linear fits run far below and above all that is there.
-void keepInRange(Rgb<float>& fitted, const Rgb<float>& image) {
-  parallelRows(image.height(), [&](int y) {
-    for (size_t c = 0; c < 3; ++c)
-      for (int x = 0; x < image.width(); ++x) {
-        float least = image[c].at(x, y), most = least;
-        for (int v = std::max(0, y - kRange); v <= std::min(image.height() - 1, y + kRange); ++v)
-          for (int u = std::max(0, x - kRange); u <= std::min(image.width() - 1, x + kRange); ++u) {
-            least = std::min(least, image[c].at(u, v));
-            most = std::max(most, image[c].at(u, v));
-          }
-        fitted[c].at(x, y) = std::clamp(fitted[c].at(x, y), least, most);
-      }
-  });
-}
-
 // Regressions in one image: its offset planes, settings, and what was counted.
 class Regressor {
  public:
-  Regressor(int width, int height, const NforOptions& options) {
+  // Both outlive it: the noisy image and the variance of its mean.
+  Regressor(const Rgb<float>& noisy, const Rgb<float>& variance, const NforOptions& options)
+      : noisy_(noisy), variance_(variance) {
+    const int width = noisy.width(), height = noisy.height();
     settings_.radius = kWindow;
     settings_.stride = options.stride;
     settings_.fallbackWeight = options.stride > 1 ? kFallbackWeight : 0;
@@ -162,13 +149,18 @@ class Regressor {
     in.terms = {{&target, &window, nullptr}};
     in.fallback = weights.zeroOrder[0].empty() ? &target : &weights.zeroOrder[halfSensitivity ? 1 : 0];
     Rgb<float> out = regress(in, settings_, &report);
-    keepInRange(out, target);
+    // Beside a small bright highlight, whose pixels look like anything because they are so noisy, linear fits run far
+    // below and above all that is there.
+    const std::array images = {&out};
+    const std::array values = {&target};
+    keepInAlikeRange(images, values, noisy_, variance_, kRange);
     return out;
   }
 
   RegressionReport report;
 
  private:
+  const Rgb<float>&noisy_, &variance_;
   RegressionSettings settings_;
   Plane<float> x_, y_;
 };
@@ -217,7 +209,7 @@ NforResult nforFilter(const Estimate& estimate, const Features* features, const 
   const FeatureChannels meanFeatures = prefilteredMean(crossed);
   const Colours colours = coloursOf(estimate, options.demodulate ? meanFeatures.albedo() : nullptr);
   const Rgb<float> variance = guideVariance(colours, passesOf(estimate), options.variance);
-  Regressor regressor(width, height, options);
+  Regressor regressor(colours.mean, variance, options);
   NforResult result;
   {
     const Candidates candidates = crossedCandidates(colours, variance, crossed, regressor);

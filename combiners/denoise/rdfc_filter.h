@@ -36,9 +36,10 @@ Rgb<float> rdfcVariance(const Estimate& estimate, RdfcVariance kind);
 
 // Filters the mean and the halves of an estimate of at least two passes. The halves share all weights and the
 // selection: these come from the mean, its variance, the prefiltered features and, in the second pass, the variance
-// between the filtered halves. With these given, a half of the result is linear in that half of the colour and does not
-// see the other one. Features may be null or empty; then there is no third candidate. Without halves there is no second
-// pass. Deterministic for any number of threads. rdfcVariance() must not be empty.
+// between the filtered halves. With these given, a half of the result is linear in that half of the colour, but for the
+// range that alike pixels about it allow (alike_range.h), and does not see the other one. Features may be null or
+// empty; then there is no third candidate. Without halves there is no second pass. Deterministic for any number of
+// threads. rdfcVariance() must not be empty.
 RdfcResult rdfcDenoised(const Estimate& estimate, const Features* features, const RdfcOptions& options,
                         const std::atomic<bool>* cancel = nullptr);
 
