@@ -11,8 +11,8 @@
 //   4. The selection of the better bandwidth is filtered and blends the candidates of both halves to R_A and R_B.
 //   5. The mean of R_A and R_B is regressed once more on the mean features, with k = 1 and the variance ¼ (R_A - R_B)².
 //
-// What is not in the paper can be turned off. Its ridge is 10⁻³ of the mean diagonal, on features scaled to the window
-// (regression.h): smaller ones fit noise (3 % more error).
+// What is not in the paper can be turned off, but for the range that fits are kept in (alike_range.h). The ridge is
+// 10⁻³ of the mean diagonal, on features scaled to the window (regression.h): smaller ones fit noise (3 % more error).
 #pragma once
 
 #include <atomic>
