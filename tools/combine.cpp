@@ -36,12 +36,16 @@ bool isFile(const std::string& text) {
 
 bool looksLikeFile(const std::string& text) { return text.find('.') != std::string::npos || isFile(text); }
 
+void checkSize(const std::string& file, int width, int height, const Estimates& all) {
+  if (width != all.width || height != all.height)
+    throw Error(ExitCode::BadInput, fmt::format("{}: {}x{} pixels, but the unbiased image has {}x{}", file, width,
+                                                height, all.width, all.height));
+}
+
 // Adds the first estimate of `from` that fits, or else the very first, under a name that is free. Returns the name.
 template <class Fits>
 std::string addEstimate(Estimates& all, Estimates from, const std::string& file, const Fits& fits) {
-  if (from.width != all.width || from.height != all.height)
-    throw Error(ExitCode::BadInput, fmt::format("{}: {}x{} pixels, but the unbiased image has {}x{}", file, from.width,
-                                                from.height, all.width, all.height));
+  checkSize(file, from.width, from.height, all);
   auto found = std::find_if(from.estimates.begin(), from.estimates.end(), fits);
   if (found == from.estimates.end() || file.find(':') != std::string::npos) found = from.estimates.begin();
   while (all.find(found->name) || isMethod(found->name)) found->name += "-file";
@@ -65,10 +69,8 @@ Estimates readBiased(const std::string& text, const ReadOptions& options) {
 }
 
 Rgb<float> readReferenceImage(const std::string& file, const Estimates& all) {
-  ImageFile image = readImage(file);
-  if (image.width != all.width || image.height != all.height)
-    throw Error(ExitCode::BadInput, fmt::format("{}: {}x{} pixels, but the unbiased image has {}x{}", file, image.width,
-                                                image.height, all.width, all.height));
+  const ImageFile image = readImage(file);
+  checkSize(file, image.width, image.height, all);
   return image.rgb("");
 }
 
