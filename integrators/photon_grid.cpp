@@ -39,7 +39,8 @@ Vec3 unpackDirection(uint32_t packed, int bits) {
   return glm::normalize(Vec3(x - signOf(x) * fold, y - signOf(y) * fold, z));
 }
 
-PhotonGrid::PhotonGrid(std::vector<Photon> photons, const RadiusScale& scale) : scale_(scale) {
+template <class PhotonType>
+GridOf<PhotonType>::GridOf(std::vector<PhotonType> photons, const RadiusScale& scale) : scale_(scale) {
   BRAID_ASSERT(scale.smallest > 0 && scale.largest >= scale.smallest && photons.size() < (size_t(1) << 32));
   const float ratio = scale.largest / scale.smallest;
   largestRatio2_ = scale.perspective ? sqr(ratio) : sqr(scale.radius(0) / scale.smallest);
@@ -77,5 +78,8 @@ PhotonGrid::PhotonGrid(std::vector<Photon> photons, const RadiusScale& scale) : 
     }
   });
 }
+
+template class GridOf<Photon>;
+template class GridOf<CausticPhoton>;
 
 }  // namespace braid

@@ -31,6 +31,14 @@ struct Photon {
 };
 static_assert(sizeof(Photon) == 32);
 
+// One that left a light and met delta scattering alone, at least once: an eye path can find the same light if it hits
+// the lamp by chance. 36 bytes.
+struct CausticPhoton : Photon {
+  // Of an eye path that goes back along `direction` with density 1 per steradian: how densely it hits the light where
+  // the photon started, over the density of photons per m² here and light subpath. 0: no ray can hit the light.
+  float hitDensity = 0;
+};
+
 // Gather radii over the distance from the camera.
 struct RadiusScale {
   Vec3 camera{0};
@@ -52,9 +60,10 @@ struct RadiusScale {
   }
 };
 
-class PhotonGrid {
+template <class PhotonType>
+class GridOf {
  public:
-  PhotonGrid(std::vector<Photon> photons, const RadiusScale& scale);
+  GridOf(std::vector<PhotonType> photons, const RadiusScale& scale);
 
   size_t size() const { return photons_.size(); }
   const RadiusScale& scale() const { return scale_; }
@@ -65,7 +74,7 @@ class PhotonGrid {
 
   // Bytes that a grid of so many photons needs while it is built, the photons themselves included.
   static uint64_t bytesWhileBuilding(uint64_t photons) {
-    return photons * (2 * sizeof(Photon) + 2 * sizeof(uint32_t)) + (2 * photons + 1024) * sizeof(uint32_t);
+    return photons * (2 * sizeof(PhotonType) + 2 * sizeof(uint32_t)) + (2 * photons + 1024) * sizeof(uint32_t);
   }
 
  private:
@@ -104,17 +113,21 @@ class PhotonGrid {
   std::vector<float> inverses_;  // 1 / cell size, per level
   uint32_t mask_ = 0;
   std::vector<uint32_t> start_;  // of each bucket, and the end of the last
-  std::vector<Photon> photons_;
+  std::vector<PhotonType> photons_;
 };
 
+using PhotonGrid = GridOf<Photon>;
+using CausticGrid = GridOf<CausticPhoton>;
+
+template <class PhotonType>
 template <class Visit>
-void PhotonGrid::visitRow(const Vec3& p, float radius2, const Cell& from, int toX, const Visit& visit) const {
+void GridOf<PhotonType>::visitRow(const Vec3& p, float radius2, const Cell& from, int toX, const Visit& visit) const {
   uint32_t bucket = bucketOf(from);
   auto left = static_cast<uint32_t>(toX - from.x) + 1;
   while (left > 0) {
     const uint32_t count = std::min(left, mask_ + 1 - bucket);
     for (uint32_t i = start_[bucket], end = start_[bucket + count]; i < end; ++i) {
-      const Photon& photon = photons_[i];
+      const PhotonType& photon = photons_[i];
       const Vec3 d = photon.position - p;
       const float distance2 = glm::dot(d, d);
       if (!(distance2 < radius2)) continue;
@@ -126,8 +139,9 @@ void PhotonGrid::visitRow(const Vec3& p, float radius2, const Cell& from, int to
   }
 }
 
+template <class PhotonType>
 template <class Visit>
-void PhotonGrid::query(const Vec3& p, float radius, const Visit& visit) const {
+void GridOf<PhotonType>::query(const Vec3& p, float radius, const Visit& visit) const {
   if (photons_.empty()) return;
   const Vec3 centre = p - scale_.camera;
   const float distance = glm::length(centre), margin = radius * (1 + 1e-5f) + distance * 1e-6f;

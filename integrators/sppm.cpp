@@ -33,7 +33,7 @@ class PhotonMapper final : public Integrator {
   WorkingMemory workingMemory(const Plan& plan) const override {
     const uint64_t paths = photonPaths(plan);
     const auto stored = static_cast<uint64_t>(kStoredPerPath * static_cast<double>(paths));
-    return {PhotonGrid::bytesWhileBuilding(stored),
+    return {CausticGrid::bytesWhileBuilding(stored),
             fmt::format("for the photons of {} light paths a pass, {} kept of each on average at most; first radius {} "
                         "pixels, direct light by {}, lights chosen by power{}",
                         paths, kStoredPerPath, plan.settings.photonRadius,
@@ -48,18 +48,6 @@ class PhotonMapper final : public Integrator {
   bool renderPass(const PassRequest& request, PassTarget& target) const override;
 };
 
-// Adds what the photons about a vertex send to the eye, and returns the bias of that.
-Spectrum addPhotons(const PhotonGrid& grid, const SubpathVertex& vertex, const Plan& plan, double lightPaths,
-                    PathSample& sample) {
-  const float radius = grid.scale().radiusAt(vertex.hit.position, vertex.travelled);
-  const PhotonSum sum = gatherPhotons(grid, vertex, radius, plan.settings.maxDepth - vertex.segments);
-  const double area = static_cast<double>(kPi) * sqr(static_cast<double>(radius));
-  const auto scale = static_cast<float>(1 / (lightPaths * area));
-  sample.radiance += vertex.throughput * (sum.inner + sum.outer) * scale;
-  // The bias of a constant kernel grows with its area: that of the whole disc is twice its excess over half of it.
-  return vertex.throughput * (2.0f * (sum.outer - sum.inner)) * scale;
-}
-
 bool PhotonMapper::renderPass(const PassRequest& request, PassTarget& target) const {
   const Plan& plan = request.plan;
   const PhotonPreparation::Ref preparation(request);
@@ -72,12 +60,16 @@ bool PhotonMapper::renderPass(const PassRequest& request, PassTarget& target) co
                     request.cancel, traced))
     return false;
   if (request.statistics) request.statistics->rays += traced.segments;
-  const PhotonGrid grid(std::move(traced.photons), gatherRadii(plan, request.context.scene.traits(), request.pass));
+  const RadiusScale radii = gatherRadii(plan, request.context.scene.traits(), request.pass);
+  const PhotonGrid grid(std::move(traced.photons), radii);
+  const CausticGrid causticGrid(std::move(traced.caustics), radii);
+  const auto lightPaths = static_cast<double>(paths);
+  const CausticMerging caustics{causticGrid, preparation->emission(), lightPaths, preparation->keep()};
+  const bool merges = mergesCaustics(request.context.scene, plan.settings.maxDepth);
   const MediaStack cameraMedia = mediaOfCamera(request.context.scene, plan.camera);
 
   return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>*) {
-    PhotonEyeBatch batch(request.context, plan, eyeSampler, cameraMedia);
-    std::array<Spectrum, kBatch> bias;
+    PhotonEyeBatch batch(request.context, plan, eyeSampler, cameraMedia, merges ? &caustics : nullptr);
     forEachBatch(
         tile,
         [&](int i, int x, int y) {
@@ -85,9 +77,10 @@ bool PhotonMapper::renderPass(const PassRequest& request, PassTarget& target) co
           batch.start(x, y, pixelKey(eyeSampler, plan, x, y));
         },
         [&] {
-          bias.fill(Spectrum(0));
           batch.run([&](int i, const SubpathVertex& vertex) {
-            bias[static_cast<size_t>(i)] = addPhotons(grid, vertex, plan, static_cast<double>(paths), batch.sample(i));
+            const float radius = radii.radiusAt(vertex.hit.position, vertex.travelled);
+            const int maxSegments = plan.settings.maxDepth - vertex.segments;
+            batch.addGathered(i, vertex, gatherPhotons(grid, vertex, radius, maxSegments), lightPaths, radius);
           });
         },
         [&](int i, int x, int y) {
@@ -96,7 +89,7 @@ bool PhotonMapper::renderPass(const PassRequest& request, PassTarget& target) co
           if (!target.wantsBias()) return;
           const float largest = maxComponent(sample.radiance), clamp = plan.settings.clamp;
           const float scale = clamp > 0 && largest > clamp ? clamp / largest : 1.0f;
-          target.bias(x - plan.window.x0, y - plan.window.y0, bias[static_cast<size_t>(i)] * scale);
+          target.bias(x - plan.window.x0, y - plan.window.y0, batch.bias(i) * scale);
         });
     return TileCounts{pixelCount(tile), batch.rayCount(), batch.shadowRayCount};
   });

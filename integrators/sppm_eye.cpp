@@ -12,25 +12,27 @@ namespace braid {
 
 namespace {
 
-WalkSettings eyeSettings(const Plan& plan) {
+WalkSettings eyeSettings(const Plan& plan, bool merges) {
   WalkSettings s;
   s.transport = Transport::Radiance;
   s.maxSegments = plan.settings.maxDepth;
   s.mis = false;
+  s.deltaChains = merges;
   return s;
 }
 
 }  // namespace
 
 PhotonEyeBatch::PhotonEyeBatch(const TransportContext& context, const Plan& plan, const PassSampler& sampler,
-                               const MediaStack& cameraMedia)
+                               const MediaStack& cameraMedia, const CausticMerging* caustics)
     : context_(context),
       scene_(context.scene),
       plan_(plan),
       sampler_(sampler),
       cameraMedia_(cameraMedia),
+      caustics_(caustics),
       lightsCanBeHit_(!context.scene.emitters().empty() || context.scene.environment()),
-      walks_(context, sampler, eyeSettings(plan)) {}
+      walks_(context, sampler, eyeSettings(plan, caustics)) {}
 
 void PhotonEyeBatch::clear() {
   walks_.clear();
@@ -43,12 +45,14 @@ void PhotonEyeBatch::start(int x, int y, uint64_t key) {
   const Camera::CameraRay ray = cameraRayThrough(plan_, camera, x, y);
   path_[static_cast<size_t>(count_)] = Path();
   sample_[static_cast<size_t>(count_)] = PathSample();
+  bias_[static_cast<size_t>(count_)] = Spectrum(0);
   ++count_;
   walks_.startCamera(key, ray, cameraMedia_, 1, 1, plan_.camera.orthographic());
 }
 
 PhotonEyeBatch::Step PhotonEyeBatch::shade(int index, SubpathState& state, SubpathVertex& vertex) {
   Path& path = path_[static_cast<size_t>(index)];
+  path.arrive(state);
   const MaterialSummary& material = context_.summaryOf(vertex.hit);
   if (material.unlit) {
     addUnlit(index, state, vertex);
@@ -75,6 +79,7 @@ PhotonEyeBatch::Step PhotonEyeBatch::shade(int index, SubpathState& state, Subpa
               {share > 0 ? (broad ? &*broad : &vertex.bsdf) : nullptr,
                share < 1 ? (narrow ? &*narrow : &vertex.bsdf) : nullptr, share},
               block, first);
+  if (caustics_ && share < 1) mergeCaustics(index, vertex, narrow ? *narrow : vertex.bsdf, 1 - share);
   const bool gathers = block.u[slot::kExtra] < share;
   if (broad) {
     path.choice = gathers ? share : 1 - share;
@@ -85,6 +90,33 @@ PhotonEyeBatch::Step PhotonEyeBatch::shade(int index, SubpathState& state, Subpa
   if (!gathers) return {.goesOn = true};
   path.seekingLight = true;
   return {.goesOn = lightsCanBeHit_ && !plan_.settings.photonDirect, .gather = true};
+}
+
+void PhotonEyeBatch::addGathered(int index, const SubpathVertex& vertex, const PhotonSum& sum, double lightPaths,
+                                 float radius) {
+  const GatheredLight light = gatheredLight(sum, lightPaths, radius);
+  sample_[static_cast<size_t>(index)].radiance += vertex.throughput * light.radiance;
+  bias_[static_cast<size_t>(index)] += vertex.throughput * light.bias;
+}
+
+void PhotonEyeBatch::mergeCaustics(int index, const SubpathVertex& vertex, const Bsdf& narrow, float choice) {
+  if (!narrow.hasNonDelta()) return;
+  const float radius = caustics_->grid.scale().radiusAt(vertex.hit.position, vertex.travelled);
+  const double density = caustics_->density(radius);
+  path_[static_cast<size_t>(index)].mergedHere2 = sqr(density / static_cast<double>(choice));
+  const PhotonSum sum =
+      gatherCaustics(*caustics_, vertex, narrow, choice, radius, plan_.settings.maxDepth - vertex.segments);
+  addGathered(index, vertex, sum, caustics_->lightPaths, radius);
+}
+
+// Weight of a light that was hit where next-event estimation could not find it; `direction` leads away from the light.
+float PhotonEyeBatch::causticHitWeight(int index, const SubpathState& state, uint32_t light, const Vec3& direction,
+                                       float cosLight) const {
+  const double merged2 = path_[static_cast<size_t>(index)].merged2;
+  if (state.deltaRun == 0 || !(merged2 > 0)) return 1;
+  const float emit = caustics_->emission.pdfEmit(light, direction, cosLight);
+  if (!(emit > 0)) return 1;
+  return static_cast<float>(1 / (1 + sqr(static_cast<double>(emit)) * state.chain * merged2));
 }
 
 // As in the path tracer: shown to the camera and to mirrors only.
@@ -104,18 +136,23 @@ void PhotonEyeBatch::addEmission(int index, const SubpathState& state, const Sub
   float weight = 1;
   const int64_t emitter = scene_.emitterIndex(hit.meshIndex, hit.triangle, hit.instance);
   const float cosLight = glm::dot(hit.wo, hit.ng);
-  if (!state.lightCouldNotBeSampled && emitter >= 0 && cosLight > 0) {
-    const float distance = glm::length(hit.position - state.lastPosition);
-    weight = powerHeuristic(path_[static_cast<size_t>(index)].choice * state.lastPdfW,
-                            context_.lights.pdfEmitter(state.lastPosition, state.lastNormal, state.lastTwoSided,
-                                                       static_cast<size_t>(emitter), distance, cosLight));
+  if (emitter >= 0 && cosLight > 0) {
+    const auto light = static_cast<uint32_t>(emitter);
+    if (state.lightCouldNotBeSampled)
+      weight = causticHitWeight(index, state, light, hit.wo, cosLight);
+    else
+      weight =
+          powerHeuristic(path_[static_cast<size_t>(index)].choice * state.lastPdfW,
+                         context_.lights.pdfEmitter(state.lastPosition, state.lastNormal, state.lastTwoSided, light,
+                                                    glm::length(hit.position - state.lastPosition), cosLight));
   }
   sample_[static_cast<size_t>(index)].radiance += vertex.throughput * radiance * weight;
 }
 
 void PhotonEyeBatch::addEnvironment(int index, const SubpathState& state) {
   PathSample& sample = sample_[static_cast<size_t>(index)];
-  const Path& path = path_[static_cast<size_t>(index)];
+  Path& path = path_[static_cast<size_t>(index)];
+  path.arrive(state);
   const bool fromCamera = state.segments == 1;
   if (fromCamera) sample.coverage = 0;
   Spectrum radiance(0);
@@ -129,9 +166,11 @@ void PhotonEyeBatch::addEnvironment(int index, const SubpathState& state) {
     sample.features.normal = -state.direction;
     sample.features.depth = 0;
   }
-  if (fromCamera && plan_.settings.transparent) return;
+  if ((fromCamera && plan_.settings.transparent) || isBlack(radiance)) return;
   float weight = 1;
-  if (!state.lightCouldNotBeSampled)
+  if (state.lightCouldNotBeSampled)
+    weight = causticHitWeight(index, state, context_.lights.environmentLight(), -state.direction, 1);
+  else
     weight = powerHeuristic(path.choice * state.lastPdfW, context_.lights.pdfEnvironment(state.direction));
   sample.radiance += state.throughput * radiance * weight;
 }

@@ -12,6 +12,29 @@ constexpr float kSmallest = 1e-7f, kLargest = 0.05f;  // of the scene's radius
 // Photons of a surface that faces elsewhere belong to another wall. As a cosine.
 constexpr float kSameSurface = 0.1f;
 
+// Sums scattering(photon, local direction) times the photon's power.
+template <class Grid, class Scattering>
+PhotonSum gather(const Grid& grid, const SubpathVertex& vertex, float radius, int maxSegments,
+                 const Scattering& scattering) {
+  PhotonSum sum;
+  const Hit& hit = vertex.hit;
+  const float inner2 = 0.5f * sqr(radius);
+  grid.query(hit.position, radius, [&](const auto& photon, float distance2) {
+    ++sum.photons;
+    if (photon.segments > maxSegments) return;
+    const Vec3 wi = unpackDirection(photon.direction, 16);
+    const Vec3 local = hit.frame.toLocal(wi);
+    const bool reflects = local.z > 0;
+    // As for light samples: the light's side must agree with both normals.
+    if (reflects != (glm::dot(wi, hit.ng) > 0) || (!reflects && !vertex.twoSided)) return;
+    const float facing = glm::dot(unpackDirection(photon.normal, 8), hit.frame.n);
+    if (!((reflects ? facing : -facing) >= kSameSurface)) return;
+    const Spectrum value = scattering(photon, local) * photon.power;
+    (distance2 < inner2 ? sum.inner : sum.outer) += value;
+  });
+  return sum;
+}
+
 }  // namespace
 
 float radiusShrinkage(uint64_t pass) {
@@ -31,24 +54,26 @@ RadiusScale gatherRadii(const Plan& plan, const SceneTraits& traits, uint64_t pa
   return s;
 }
 
+GatheredLight gatheredLight(const PhotonSum& sum, double lightPaths, float radius) {
+  const double area = static_cast<double>(kPi) * sqr(static_cast<double>(radius));
+  const auto scale = static_cast<float>(1 / (lightPaths * area));
+  // The bias of a constant kernel grows with its area: that of the whole disc is twice its excess over half of it.
+  return {(sum.inner + sum.outer) * scale, (2.0f * (sum.outer - sum.inner)) * scale};
+}
+
 PhotonSum gatherPhotons(const PhotonGrid& grid, const SubpathVertex& vertex, float radius, int maxSegments) {
-  PhotonSum sum;
-  const Hit& hit = vertex.hit;
-  const float inner2 = 0.5f * sqr(radius);
-  grid.query(hit.position, radius, [&](const Photon& photon, float distance2) {
-    ++sum.photons;
-    if (photon.segments > maxSegments) return;
-    const Vec3 wi = unpackDirection(photon.direction, 16);
-    const Vec3 local = hit.frame.toLocal(wi);
-    const bool reflects = local.z > 0;
-    // As for light samples: the light's side must agree with both normals.
-    if (reflects != (glm::dot(wi, hit.ng) > 0) || (!reflects && !vertex.twoSided)) return;
-    const float facing = glm::dot(unpackDirection(photon.normal, 8), hit.frame.n);
-    if (!((reflects ? facing : -facing) >= kSameSurface)) return;
-    const Spectrum value = vertex.bsdf.evaluate(local).f * photon.power;
-    (distance2 < inner2 ? sum.inner : sum.outer) += value;
+  return gather(grid, vertex, radius, maxSegments,
+                [&](const Photon&, const Vec3& wi) { return vertex.bsdf.evaluate(wi).f; });
+}
+
+PhotonSum gatherCaustics(const CausticMerging& merging, const SubpathVertex& vertex, const Bsdf& narrow, float choice,
+                         float radius, int maxSegments) {
+  const double density = merging.density(radius) / static_cast<double>(choice);
+  return gather(merging.grid, vertex, radius, maxSegments, [&](const CausticPhoton& photon, const Vec3& wi) {
+    const BsdfValue value = narrow.evaluate(wi);
+    const double hit = static_cast<double>(value.pdfW) * static_cast<double>(photon.hitDensity) / density;
+    return value.f * static_cast<float>(1 / (1 + sqr(hit)));
   });
-  return sum;
 }
 
 }  // namespace braid

@@ -4,6 +4,7 @@
 
 #include "integrators/photon_grid.h"
 #include "renderer/session/plan.h"
+#include "renderer/transport/light_emission.h"
 #include "renderer/transport/subpath.h"
 
 namespace braid {
@@ -23,7 +24,34 @@ struct PhotonSum {
   uint32_t photons = 0;         // inside of the radius, also those that do not count
 };
 
+// What photons about a vertex send toward the eye, W·sr⁻¹·m⁻², before the eye path's throughput.
+struct GatheredLight {
+  Spectrum radiance{0};
+  Spectrum bias{0};  // of it, estimated
+};
+GatheredLight gatheredLight(const PhotonSum& sum, double lightPaths, float radius);
+
 // Gathers at an eye vertex with its BSDF as it is. `maxSegments`: longest light subpath that counts.
 PhotonSum gatherPhotons(const PhotonGrid& grid, const SubpathVertex& vertex, float radius, int maxSegments);
+
+// Light that met delta scattering alone on its way to a narrow lobe is found in two ways: the eye path hits the lamp,
+// or photons of that light lie about the vertex. Small lamps want the second, sharp reflections the first; the power
+// heuristic weighs them (as merging does in Georgiev et al. 2012, with these two ways alone).
+struct CausticMerging {
+  const CausticGrid& grid;
+  const LightEmission& emission;
+  double lightPaths;  // of the pass
+  float keep = 1;     // probability with which a photon is kept
+
+  // Photons kept within a radius, if each light subpath left one per m².
+  double density(float radius) const {
+    return lightPaths * static_cast<double>(keep) * static_cast<double>(kPi) * sqr(static_cast<double>(radius));
+  }
+};
+
+// Gathers caustic photons at an eye vertex by the lobes of `narrow`, each weighed against hitting its light with the
+// probability `choice` of going on by those lobes.
+PhotonSum gatherCaustics(const CausticMerging& merging, const SubpathVertex& vertex, const Bsdf& narrow, float choice,
+                         float radius, int maxSegments);
 
 }  // namespace braid

@@ -2,6 +2,7 @@
 #include "integrators/sppm_photons.h"
 
 #include <atomic>
+#include <cmath>
 #include <utility>
 
 #include "renderer/core/parallel.h"
@@ -29,7 +30,23 @@ bool makePhoton(const SubpathVertex& vertex, float keep, Photon& photon) {
 
 float hashToUnit(uint32_t h) { return static_cast<float>(h >> 8) * 0x1p-24f; }
 
+template <class PhotonType>
+void gatherChunks(std::vector<std::vector<PhotonType>>& chunks, std::vector<PhotonType>& out) {
+  std::vector<size_t> offset(chunks.size() + 1, 0);
+  for (size_t c = 0; c < chunks.size(); ++c) offset[c + 1] = offset[c] + chunks[c].size();
+  out.resize(offset.back());
+  parallelFor(chunks.size(), [&](size_t c) {
+    std::copy(chunks[c].begin(), chunks[c].end(), out.begin() + static_cast<std::ptrdiff_t>(offset[c]));
+    std::vector<PhotonType>().swap(chunks[c]);
+  });
+}
+
 }  // namespace
+
+bool depositsCaustic(const SubpathVertex& vertex) {
+  return vertex.deltaOnly && vertex.segments > 1 && !vertex.woBelow && vertex.bsdf.broadShare() < 1 &&
+         vertex.bsdf.restricted(LobeGroup::Narrow).hasNonDelta();
+}
 
 uint64_t photonPaths(const Plan& plan) {
   if (plan.settings.photons > 0) return plan.settings.photons;
@@ -40,11 +57,12 @@ uint64_t photonPaths(const Plan& plan) {
 bool tracePhotons(const TransportContext& context, const PhotonEmission& light, const Settings& settings, float keep,
                   const std::atomic<bool>* cancel, TracedPhotons& out) {
   const size_t chunks = static_cast<size_t>((light.paths + kChunk - 1) / kChunk);
-  std::vector<std::vector<Photon>> chunk(chunks);
-  std::vector<size_t> offset(chunks + 1, 0);
+  std::vector<std::vector<Photon>> photons(chunks);
+  std::vector<std::vector<CausticPhoton>> caustics(chunks);
   std::atomic<uint64_t> segments{0};
   std::atomic<bool> cancelled{false};
   const int firstSegment = firstPhotonSegment(settings);
+  const bool merges = mergesCaustics(context.scene, settings.maxDepth);
   parallelFor(chunks, [&](size_t c) {
     if (cancel && cancel->load(std::memory_order_relaxed)) {
       cancelled = true;
@@ -53,21 +71,23 @@ bool tracePhotons(const TransportContext& context, const PhotonEmission& light, 
     const uint64_t begin = c * kChunk, end = std::min(light.paths, begin + kChunk);
     segments += followLightPaths(context, light, settings.maxDepth, begin, end,
                                  [&](uint64_t, const SubpathState& state, const SubpathVertex& v) {
-                                   Photon photon;
-                                   if (!depositsPhoton(v, firstSegment)) return true;
+                                   const bool broad = depositsPhoton(v, firstSegment),
+                                              caustic = merges && depositsCaustic(v);
+                                   if (!broad && !caustic) return true;
                                    const auto draw = static_cast<uint32_t>(v.segments) | 0x40000000u;
                                    if (keep < 1 && hashToUnit(light.sampler.salt(state.key, draw)) >= keep) return true;
-                                   if (makePhoton(v, keep, photon)) chunk[c].push_back(photon);
+                                   CausticPhoton photon;
+                                   if (!makePhoton(v, keep, photon)) return true;
+                                   if (broad) photons[c].push_back(photon);
+                                   if (!caustic) return true;
+                                   photon.hitDensity = static_cast<float>(std::sqrt(state.chain));
+                                   caustics[c].push_back(photon);
                                    return true;
                                  });
   });
   if (cancelled) return false;
-  for (size_t c = 0; c < chunks; ++c) offset[c + 1] = offset[c] + chunk[c].size();
-  out.photons.resize(offset.back());
-  parallelFor(chunks, [&](size_t c) {
-    std::copy(chunk[c].begin(), chunk[c].end(), out.photons.begin() + static_cast<std::ptrdiff_t>(offset[c]));
-    std::vector<Photon>().swap(chunk[c]);
-  });
+  gatherChunks(photons, out.photons);
+  gatherChunks(caustics, out.caustics);
   out.segments = segments;
   return true;
 }

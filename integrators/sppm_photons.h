@@ -24,6 +24,11 @@ uint64_t photonPaths(const Plan& plan);
 // Segments of a light subpath at which its photons begin to count: direct light is found otherwise, unless asked for.
 inline int firstPhotonSegment(const Settings& settings) { return settings.photonDirect ? 1 : 2; }
 
+// Whether caustics in the reflections of narrow lobes are found by photons, too; see CausticMerging.
+inline bool mergesCaustics(const Scene& scene, int maxDepth) {
+  return maxDepth > 2 && scene.traits().has(kTraitSpecular | kTraitTransmission | kTraitClearcoat);
+}
+
 // Follows the light subpaths [begin, end); onVertex(item, vertex) is called wherever one arrives, for gathering or
 // not. Returns the number of segments traced.
 template <class OnVertex>
@@ -35,6 +40,7 @@ uint64_t followLightPaths(const TransportContext& context, const PhotonEmission&
   // Roulette from the first bounce keeps the photons' powers alike, which is what a density estimate wants.
   settings.rouletteStart = 1;
   settings.mis = false;
+  settings.deltaChains = mergesCaustics(context.scene, maxDepth);
   SubpathBatch batch(context, light.sampler, settings);
   for (uint64_t first = begin; first < end; first += kBatch) {
     const uint64_t last = std::min(end, first + kBatch);
@@ -63,11 +69,15 @@ inline bool depositsPhoton(const SubpathVertex& vertex, int firstSegment) {
   return vertex.segments >= firstSegment && !vertex.woBelow && vertex.bsdf.broadShare() > 0;
 }
 
+// Whether light that met delta scattering alone arrives where a narrow lobe scatters it.
+bool depositsCaustic(const SubpathVertex& vertex);
+
 // At most this many photons of a light subpath are kept on average: what a pass holds in memory is bounded.
 inline constexpr double kStoredPerPath = 4;
 
 struct TracedPhotons {
   std::vector<Photon> photons;
+  std::vector<CausticPhoton> caustics;  // where mergesCaustics(); those at broad lobes are among `photons` as well
   uint64_t segments = 0;
 };
 

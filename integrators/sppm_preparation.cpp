@@ -119,6 +119,7 @@ Pilot runPilot(const TransportContext& context, const Plan& plan, const LightEmi
   const PassSampler sampler(SamplerKind::Independent, plan.settings.seed, kLightStream, 0);
   const PhotonEmission light{emission, sampler, paths};
   const int firstSegment = firstPhotonSegment(plan.settings);
+  const bool merges = mergesCaustics(context.scene, plan.settings.maxDepth);
   constexpr uint64_t kNever = ~uint64_t(0);
   std::atomic<uint64_t> stored{0};
   std::vector<LightRecord> records(context.lights.size());
@@ -131,6 +132,7 @@ Pilot runPilot(const TransportContext& context, const Plan& plan, const LightEmi
                      [&](uint64_t item, const SubpathState& state, const SubpathVertex& v) {
                        LightRecord& record = records[state.light];
                        if (v.segments == 1) std::atomic_ref<uint32_t>(record.paths).fetch_add(1);
+                       if (merges && depositsCaustic(v)) ++storedHere;
                        if (!depositsPhoton(v, firstSegment)) return true;
                        ++storedHere;
                        uint64_t& last = counted[(item - begin) % kBatch];

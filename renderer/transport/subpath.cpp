@@ -93,6 +93,8 @@ void SubpathBatch::startLight(uint64_t key, const LightStart& start, const Media
   s.pdfEmit = start.pdfEmit;
   s.cosLight = start.cosLight;
   s.deltaLight = start.delta;
+  if (settings_.deltaChains && !start.delta)
+    s.chain = sqr(static_cast<double>(start.cosLight) / static_cast<double>(start.pdfEmit));
 }
 
 void SubpathBatch::startNothing() {
@@ -154,6 +156,7 @@ SubpathBatch::Arrival SubpathBatch::arrive(SubpathState& state, const Hit& hit) 
     state.mis.vc *= inverse;
     state.mis.vm *= inverse;
   }
+  if (settings_.deltaChains) state.chain /= sqr(geometricCosine(hit, hit.wo));
   state.atStart = false;
   if (material.volume && crossNullInterface(state, hit))
     return state.nullCrossings < kMaxNullCrossings ? Arrival::Null : Arrival::End;
@@ -167,6 +170,7 @@ bool SubpathBatch::crossNullInterface(SubpathState& state, const Hit& hit) const
   state.origin = offsetOrigin(hit, state.direction);
   state.lightCouldNotBeSampled = true;
   ++state.nullCrossings;
+  if (settings_.deltaChains) state.chain *= sqr(geometricCosine(hit, state.direction));
   if (settings_.mis) {
     const double cosine2 = sqr(geometricCosine(hit, state.direction));
     state.mis = {0, state.mis.vc * cosine2, state.mis.vm * cosine2};
@@ -219,6 +223,11 @@ bool SubpathBatch::scatter(SubpathState& state, const SubpathVertex& vertex) con
       m.vm = ratio * (m.vm * sqr(reverse) + m.vcm * settings_.connectWeight + 1);
       m.vcm = sqr(1 / forward);
     }
+  }
+  state.deltaRun = sample.delta ? state.deltaRun + 1 : 0;
+  if (settings_.deltaChains) {
+    const double cosine2 = sqr(geometricCosine(hit, direction));
+    state.chain = sample.delta ? state.chain * cosine2 : cosine2 / sqr(static_cast<double>(sample.pdfW));
   }
   state.origin = offsetOrigin(hit, direction);
   state.direction = direction;

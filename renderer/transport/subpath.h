@@ -35,6 +35,7 @@ struct WalkSettings {
   double connectWeight = 0;  // (1 / etaVCM)² when vertices are merged as well, else 0
   double mergeWeight = 0;    // etaVCM² with etaVCM = π r² · light subpaths, else 0
   bool mis = true;           // false: the quantities are not needed and stay 0
+  bool deltaChains = false;  // whether SubpathState::chain is needed
 };
 
 // A surface point that a walk has arrived at.
@@ -81,6 +82,11 @@ struct SubpathState {
   float etaScale = 1;
   bool byDistance = true;  // densities of the first hit depend on its distance: not for parallel rays
   bool deltaOnly = true;
+  int deltaRun = 0;  // delta scattering events since the last other one, or since the start
+  // Squared density of finding the other end of such a run from there, over that of walking it from here: (cos / pdf)²
+  // of what it began with, times the squared ratios of cosines at its vertices. What the density of the end's own start
+  // is, 1 / pdfEmit or that of a BSDF, remains to be multiplied with.
+  double chain = 0;
   float leastPdfW = kInfinity;  // of the directions sampled so far; delta ones do not count
   bool atStart = true;          // no surface met yet
 
