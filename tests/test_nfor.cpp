@@ -106,7 +106,7 @@ TEST_CASE("The zero-order means beside the stored weights are those of the filte
   const Case c = caseOf(150, 41, 16);
   const Estimate& e = c.pt();
   const NlmGuide guide = nlmGuide(e.mean, e.variance, 1, 1), half = nlmGuide(e.mean, e.variance, 0.5f, 1);
-  std::array<Rgb<float>, 2> means;
+  std::array<Rgb<float>, 2> means = {Rgb<float>(150, 41), Rgb<float>(150, 41)};
   const NlmWindowStore store(std::span(&guide, 1), 4, 2, &e.half[0], &means);
   CHECK(relativeError(means[0], nlmFilter(guide, 4, e.half[0])) < 1e-5);
   CHECK(relativeError(means[1], nlmFilter(half, 4, e.half[0])) < 1e-3);

@@ -126,16 +126,20 @@ class Regressor {
   }
 
   // The weights of an image of the given variance, k = 1 and 0.5. Both are doubled: the variance of a half is twice
-  // that of the mean, and the last pass keeps the factor. `target` is what will be regressed.
+  // that of the mean, and the last pass keeps the factor. `target` is what will be regressed, at both or at k = 1
+  // alone.
   struct Weights {
     std::array<Rgb<float>, 2> zeroOrder;  // of the target; empty if there is a model for every pixel
     NlmWindowStore store;
   };
-  Weights weights(const Rgb<float>& guide, const Rgb<float>& variance, const Rgb<float>& target) const {
+  Weights weights(const Rgb<float>& guide, const Rgb<float>& variance, const Rgb<float>& target, bool both) const {
     std::array<NlmGuide, 3> guides = guidesOf(guide, variance, 1, kPatch);
     for (NlmGuide& g : guides) g.varianceScale = 2;
     std::array<Rgb<float>, 2> zeroOrder;
-    NlmWindowStore store(guides, kWindow, settings_.stride, &target, settings_.stride > 1 ? &zeroOrder : nullptr);
+    const bool strided = settings_.stride > 1;
+    for (size_t k = 0; k < 2 && strided && (k == 0 || both); ++k)
+      zeroOrder[k] = Rgb<float>(target.width(), target.height());
+    NlmWindowStore store(guides, kWindow, settings_.stride, &target, strided ? &zeroOrder : nullptr);
     return {std::move(zeroOrder), std::move(store)};
   }
 
@@ -174,7 +178,7 @@ Candidates crossedCandidates(const Colours& colours, const Rgb<float>& variance,
                              Regressor& regressor) {
   Candidates out;
   for (size_t h = 0; h < 2; ++h) {
-    const Regressor::Weights weights = regressor.weights(colours.half[1 - h], variance, colours.half[h]);
+    const Regressor::Weights weights = regressor.weights(colours.half[1 - h], variance, colours.half[h], true);
     for (size_t k = 0; k < 2; ++k)
       out.half[h][k] = regressor.run(colours.half[h], features.half[1 - h], weights, k == 1);
   }
@@ -223,7 +227,7 @@ NforResult nforFilter(const Estimate& estimate, const Features* features, const 
   const Rgb<float> mean = average(result.half[0], result.half[1]);
   const Rgb<float> left = imageOf(
       width, height, [&](size_t c, size_t i) { return 0.25f * sqr(result.half[0][c][i] - result.half[1][c][i]); });
-  result.mean = regressor.run(mean, meanFeatures, regressor.weights(mean, left, mean), false);
+  result.mean = regressor.run(mean, meanFeatures, regressor.weights(mean, left, mean, false), false);
   if (!colours.divisor.empty())
     for (Rgb<float>* image : {&result.mean, &result.half[0], &result.half[1]}) multiply(*image, colours.divisor);
   result.report = regressor.report;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "combiners/denoise/nlm_filter.h"
 
-#include <array>
 #include <cstddef>
 
 #include "renderer/core/error.h"
@@ -12,6 +11,9 @@ namespace {
 
 constexpr int kTileWidth = 256, kTileHeight = 32;
 constexpr float kMaxDistance = 1e4f;
+// Weights below 2^-60 are 0: their products with colours would be subnormal, which processors take a hundred times
+// longer over.
+constexpr float kLowestExponent = -60;
 
 // out[x] += d² of one channel for `count` pairs; p and q are the first pixels of the two rows.
 struct PairRows {
@@ -90,39 +92,23 @@ void patchRow(int radius, const float* first, ptrdiff_t pitch, const float* inve
 }
 
 void weightsFromDistances(float* __restrict w, int count) {
-  for (int x = 0; x < count; ++x) w[x] = exp2NonPositive(w[x] > 0 ? -kLog2E * w[x] : 0.0f);
-}
-
-void addWeighted(const float* __restrict w, const float* __restrict in, int count, float* __restrict sum) {
-  for (int x = 0; x < count; ++x) sum[x] += w[x] * in[x];
+  for (int x = 0; x < count; ++x) {
+    const float exponent = w[x] > 0 ? -kLog2E * w[x] : 0.0f;
+    w[x] = exponent > kLowestExponent ? exp2NonPositive(exponent) : 0.0f;
+  }
 }
 
 // The filter in one tile.
 void filterTile(std::span<const NlmGuide> guides, int window, std::span<const Plane<float>* const> in,
                 std::span<Plane<float>* const> out, const PixelRect& tile) {
   NlmWeights weights(guides, tile);
-  const auto width = static_cast<size_t>(tile.width()), area = width * static_cast<size_t>(tile.height());
-  std::vector<float> sums(in.size() * area), total(area);
+  TileSums sums(tile, window, in, false);
   for (int dy = -window; dy <= window; ++dy)
-    for (int dx = -window; dx <= window; ++dx) {
-      const PixelRect inside = intersection(tile, pairsAt(dx, dy, in[0]->width, in[0]->height));
-      if (inside.empty()) continue;
-      const float* w = weights.at(dx, dy);
-      runVectorised([&] {
-        for (int y = inside.y0; y < inside.y1; ++y) {
-          const size_t at = static_cast<size_t>(y - tile.y0) * width + static_cast<size_t>(inside.x0 - tile.x0);
-          for (int x = 0; x < inside.width(); ++x) total[at + static_cast<size_t>(x)] += w[at + static_cast<size_t>(x)];
-          for (size_t t = 0; t < in.size(); ++t)
-            addWeighted(w + at, &in[t]->at(inside.x0 + dx, y + dy), inside.width(), sums.data() + t * area + at);
-        }
-      });
-    }
-  for (size_t t = 0; t < in.size(); ++t)
-    for (int y = tile.y0; y < tile.y1; ++y) {
-      const size_t row = static_cast<size_t>(y - tile.y0) * width;
-      float* to = &out[t]->at(tile.x0, y);
-      for (size_t x = 0; x < width; ++x) to[x] = sums[t * area + row + x] / total[row + x];
-    }
+    for (int dx = -window; dx <= window; ++dx)
+      if (!intersection(tile, pairsAt(dx, dy, in[0]->width, in[0]->height)).empty())
+        sums.add(weights.at(dx, dy), dx, dy);
+  sums.finish();
+  for (size_t t = 0; t < in.size(); ++t) sums.mean(t, false, *out[t]);
 }
 
 }  // namespace
@@ -159,14 +145,14 @@ NlmWeights::NlmWeights(std::span<const NlmGuide> guides, const PixelRect& tile) 
   height_ = guides[0].mean[0]->height;
   const auto width = static_cast<size_t>(tile.width()), height = static_cast<size_t>(tile.height());
   const auto margin = static_cast<size_t>(2 * patch);
-  weights_.resize(width * height);
+  for (std::vector<float>& w : weights_) w.resize(width * height);
   difference_.resize(width + margin);
   rowSums_.resize(width * (height + margin));
   inverseCounts_.resize(width);
   patchSums_.resize(width);
 }
 
-void NlmWeights::addGuide(const NlmGuide& guide, int dx, int dy, const PixelRect& inside, bool first) {
+void NlmWeights::addGuide(const NlmGuide& guide, int dx, int dy, const PixelRect& inside, bool first, float* weights) {
   const int radius = guide.patch;
   const PixelRect pairs = pairsAt(dx, dy, width_, height_), needed = intersection(grown(inside, radius), pairs);
   const auto channels = static_cast<float>(guide.mean.size());
@@ -198,23 +184,25 @@ void NlmWeights::addGuide(const NlmGuide& guide, int dx, int dy, const PixelRect
     const float inverseY = 1.0f / static_cast<float>(patchCount(y, radius, pairs.y0, pairs.y1));
     patchRow(radius, rowSums_.data() + static_cast<ptrdiff_t>(y - inside.y0) * count, count, inverseCounts_.data(),
              inverseY, count, first, patchSums_.data(),
-             weights_.data() + static_cast<ptrdiff_t>(y - tile_.y0) * tile_.width() + (inside.x0 - tile_.x0));
+             weights + static_cast<ptrdiff_t>(y - tile_.y0) * tile_.width() + (inside.x0 - tile_.x0));
   }
 }
 
 const float* NlmWeights::at(int dx, int dy) {
   const PixelRect inside = intersection(tile_, pairsAt(dx, dy, width_, height_));
+  std::vector<float>& buffer = weights_[next_];
+  next_ = (next_ + 1) % weights_.size();
   if (inside.empty() || inside.width() < tile_.width() || inside.height() < tile_.height())
-    std::fill(weights_.begin(), weights_.end(), 0.0f);
-  if (inside.empty()) return weights_.data();
+    std::fill(buffer.begin(), buffer.end(), 0.0f);
+  float* weights = buffer.data();
+  if (inside.empty()) return weights;
   runVectorised([&] {
-    for (size_t g = 0; g < guides_.size(); ++g) addGuide(guides_[g], dx, dy, inside, g == 0);
+    for (size_t g = 0; g < guides_.size(); ++g) addGuide(guides_[g], dx, dy, inside, g == 0, weights);
     for (int y = inside.y0; y < inside.y1; ++y)
-      weightsFromDistances(
-          weights_.data() + static_cast<ptrdiff_t>(y - tile_.y0) * tile_.width() + (inside.x0 - tile_.x0),
-          inside.width());
+      weightsFromDistances(weights + static_cast<ptrdiff_t>(y - tile_.y0) * tile_.width() + (inside.x0 - tile_.x0),
+                           inside.width());
   });
-  return weights_.data();
+  return weights;
 }
 
 void nlmFilter(std::span<const NlmGuide> guides, int window, std::span<const Plane<float>* const> in,

@@ -10,9 +10,11 @@
 // over red, green and blue. The weight of a pixel with itself is 1.
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
+#include "combiners/denoise/tile_sums.h"
 #include "combiners/denoise/window.h"
 #include "renderer/core/plane.h"
 
@@ -40,16 +42,18 @@ class NlmWeights {
   NlmWeights(std::span<const NlmGuide> guides, const PixelRect& tile);
 
   // The weights of (p, p + (dx, dy)) for the pixels p of the tile, row by row, tile.width() apart; 0 where p + (dx, dy)
-  // lies outside the image. Valid until the next call.
+  // lies outside the image. Valid until TileSums::kAtOnce further calls.
   const float* at(int dx, int dy);
 
  private:
-  void addGuide(const NlmGuide& guide, int dx, int dy, const PixelRect& inside, bool first);
+  void addGuide(const NlmGuide& guide, int dx, int dy, const PixelRect& inside, bool first, float* weights);
 
   std::span<const NlmGuide> guides_;
   PixelRect tile_;
-  int width_, height_;  // of the image
-  std::vector<float> weights_, difference_, rowSums_, inverseCounts_, patchSums_;
+  int width_, height_;                                         // of the image
+  std::array<std::vector<float>, TileSums::kAtOnce> weights_;  // taken in turn
+  size_t next_ = 0;
+  std::vector<float> difference_, rowSums_, inverseCounts_, patchSums_;
 };
 
 // Replaces each pixel of each target by its weighted mean over the window of (2 window + 1)² pixels, clipped at the

@@ -22,7 +22,7 @@ namespace braid {
 class NlmWindowStore {
  public:
   // `zeroOrder`, if not null, gets the weighted means of `image` at every pixel: [0] at the sensitivity of the guides,
-  // [1] at half of it.
+  // and [1] at half of it unless that image is empty. The others have the size of the guides before the call.
   NlmWindowStore(std::span<const NlmGuide> guides, int radius, int stride, const Rgb<float>* image = nullptr,
                  std::array<Rgb<float>, 2>* zeroOrder = nullptr);
 
