@@ -87,6 +87,21 @@ inline Measured meanOf(const RenderResult& result, size_t c = 1) {
   return meanOver(result, c, {0, 0, result.estimates->width, result.estimates->height});
 }
 
+// Mean of all channels over renders with the seeds first, first + 1, …: the standard error of images whose pixels are
+// not independent, as those that share photons.
+inline Measured meanOverSeeds(const Scene& scene, Settings settings, int seeds, uint64_t first) {
+  double sum = 0, squares = 0;
+  for (int k = 0; k < seeds; ++k) {
+    settings.seed = first + static_cast<uint64_t>(k);
+    const RenderResult r = render(scene, settings);
+    CHECK(r.rejected == 0);
+    const double mean = (meanOf(r, 0).value + meanOf(r, 1).value + meanOf(r, 2).value) / 3;
+    sum += mean / seeds;
+    squares += mean * mean / seeds;
+  }
+  return {sum, std::sqrt(std::max(0.0, squares - sum * sum) / (seeds - 1))};
+}
+
 // Distance from an exact value in standard errors, rounding forgiven.
 inline double zScore(const Measured& m, double expected) {
   const double distance = std::fabs(m.value - expected), rounding = kRounding * std::fabs(expected);

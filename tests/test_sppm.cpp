@@ -25,24 +25,9 @@ struct Difference {
   double relative, noise;
 };
 
-// Pixels of one photon pass share photons: the standard error of the image's mean comes from seeds.
-Difference compare(const Scene& scene, const Settings& a, const Settings& b, int seeds = 5) {
-  double mean[2] = {0, 0}, error2 = 0;
-  for (int k = 0; k < 2; ++k) {
-    double sum = 0, squares = 0;
-    for (int seed = 0; seed < seeds; ++seed) {
-      Settings s = k == 0 ? a : b;
-      s.seed = static_cast<uint64_t>(100 * k + seed);
-      const RenderResult r = render(scene, s);
-      CHECK(r.rejected == 0);
-      const double m = (meanOf(r, 0).value + meanOf(r, 1).value + meanOf(r, 2).value) / 3;
-      sum += m / seeds;
-      squares += m * m / seeds;
-    }
-    mean[k] = sum;
-    error2 += std::max(0.0, squares - sum * sum) / (seeds - 1);
-  }
-  return {mean[0] / mean[1] - 1, kSigmas * std::sqrt(error2) / mean[1]};
+Difference compare(const Scene& scene, const Settings& a, const Settings& b) {
+  const Measured first = meanOverSeeds(scene, a, 5, 0), second = meanOverSeeds(scene, b, 5, 100);
+  return {first.value / second.value - 1, kSigmas * std::hypot(first.error, second.error) / second.value};
 }
 
 void checkAgree(const std::string& what, const Scene& scene, const Settings& a, const Settings& b, double bias) {

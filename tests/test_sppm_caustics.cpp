@@ -55,24 +55,6 @@ void addPoint(SceneData& data) {
   data.lights.push_back(light);
 }
 
-// Mean of an image over seeds and its standard error: the pixels of a photon pass share photons.
-struct Mean {
-  double value = 0, error = 0;
-};
-
-Mean meanOverSeeds(const Scene& scene, Settings s, int seeds) {
-  double sum = 0, squares = 0;
-  for (int k = 0; k < seeds; ++k) {
-    s.seed = static_cast<uint64_t>(k + 1);
-    const RenderResult r = render(scene, s);
-    CHECK(r.rejected == 0);
-    const double m = (meanOf(r, 0).value + meanOf(r, 1).value + meanOf(r, 2).value) / 3;
-    sum += m / seeds;
-    squares += m * m / seeds;
-  }
-  return {sum, std::sqrt(std::max(0.0, squares - sum * sum) / (seeds - 1))};
-}
-
 Settings settingsOf(const char* integrator, uint64_t spp) {
   Settings s = settingsFor(24, 24, spp);
   s.integrators = {integrator};
@@ -97,8 +79,8 @@ TEST_CASE("sppm caustics: lamps of any size in reflections of any sharpness, as 
       else
         addPoint(data);
       const Scene scene(std::move(data));
-      const Mean sppm = meanOverSeeds(scene, settingsOf("sppm", 24), 8);
-      const Mean bdpt = meanOverSeeds(scene, settingsOf("bdpt", 192), 8);
+      const Measured sppm = meanOverSeeds(scene, settingsOf("sppm", 24), 8, 1);
+      const Measured bdpt = meanOverSeeds(scene, settingsOf("bdpt", 192), 8, 1);
       const double noise = kSigmas * std::hypot(sppm.error, bdpt.error) / bdpt.value;
       MESSAGE(std::string(lamp.name), ", roughness ", roughness, ": sppm ", sppm.value, " +- ", sppm.error, ", bdpt ",
               bdpt.value, " +- ", bdpt.error);
