@@ -84,8 +84,8 @@ struct SubpathState {
   bool deltaOnly = true;
   int deltaRun = 0;  // delta scattering events since the last other one, or since the start
   // Squared density of finding the other end of such a run from there, over that of walking it from here: (cos / pdf)²
-  // of what it began with, times the squared ratios of cosines at its vertices. What the density of the end's own start
-  // is, 1 / pdfEmit or that of a BSDF, remains to be multiplied with.
+  // of what it began with, times the squared ratios of cosines at its vertices. The squared density with which a walk
+  // starts at the other end, pdfEmit or that of a BSDF, remains to be multiplied with.
   double chain = 0;
   float leastPdfW = kInfinity;  // of the directions sampled so far; delta ones do not count
   bool atStart = true;          // no surface met yet
