@@ -199,7 +199,7 @@ MethodResult Auto::run(const MethodInputs& in) const {
   }
   if (in.options.number(kDespike) != 0 && mayBeMeasured(*whole)) {
     const GivenQuarters quarters = photonMaps.empty() ? in.quarters : GivenQuarters{&fused.image.quarter};
-    const std::vector<Spike> spikes = findSpikes(whole->mean, quarters, whole->variance, in.features);
+    const std::vector<Spike> spikes = findSpikes(*whole, quarters, in.features);
     result.remarks.push_back(countRemark("replacedOutliers", spikes.size()));
     if (!fused.noise.empty()) replaceVariances(fused.noise, spikes);
     if (!spikes.empty()) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "combiners/channel_mean.h"
+#include "combiners/error_map.h"
 #include "combiners/mirror.h"
 
 namespace braid {
@@ -45,16 +46,33 @@ std::vector<char> candidates(const Rgb<float>& variance) {
   return out;
 }
 
-// The mean of the two darkest quarters.
-double darkHalf(const GivenQuarters& quarters, size_t i) {
-  std::array<double, 4> values{};
-  for (size_t q = 0; q < 4; ++q) {
-    const double value = quarters.scale * brightness((*quarters.images)[q], i);
-    values[q] = std::isfinite(value) ? value : 0;
+// The brightness of what half of the samples show, the darker half.
+class DarkHalf {
+ public:
+  DarkHalf(const Estimate& estimate, const GivenQuarters& quarters) : scale_(quarters.scale) {
+    if (quarters.images && quarters.images->size() == 4) {
+      for (const Rgb<float>& image : *quarters.images) parts_.push_back(&image);
+    } else if (!estimate.half[0].empty() && !estimate.half[1].empty()) {
+      parts_ = {&estimate.half[0], &estimate.half[1]};
+      scale_ = 1;
+    }
   }
-  std::sort(values.begin(), values.end());
-  return 0.5 * (values[0] + values[1]);
-}
+  bool known() const { return !parts_.empty(); }
+  double at(size_t i) const {
+    std::array<double, 4> values{};
+    for (size_t k = 0; k < parts_.size(); ++k) {
+      const double value = scale_ * brightness(*parts_[k], i);
+      values[k] = std::isfinite(value) ? value : 0;
+    }
+    if (parts_.size() == 2) return std::min(values[0], values[1]);
+    std::sort(values.begin(), values.end());
+    return 0.5 * (values[0] + values[1]);
+  }
+
+ private:
+  double scale_;
+  std::vector<const Rgb<float>*> parts_;  // quarters or halves
+};
 
 struct Neighbours {
   double weight = 0, brightest = 0;
@@ -91,10 +109,11 @@ Neighbours neighboursOf(const Rgb<float>& image, const Rgb<float>& variance, con
 
 }  // namespace
 
-std::vector<Spike> findSpikes(const Rgb<float>& image, const GivenQuarters& quarters, const Rgb<float>& variance,
-                              const Features* features) {
+std::vector<Spike> findSpikes(const Estimate& estimate, const GivenQuarters& quarters, const Features* features) {
+  const Rgb<float>&image = estimate.mean, &variance = estimate.variance;
+  const DarkHalf darkHalf(estimate, quarters);
   std::vector<Spike> spikes;
-  if (!quarters.images || quarters.images->size() != 4) return spikes;
+  if (!darkHalf.known()) return spikes;
   const std::vector<char> candidate = candidates(variance);
   for (int y = 0; y < image.height(); ++y)
     for (int x = 0; x < image.width(); ++x) {
@@ -106,7 +125,7 @@ std::vector<Spike> findSpikes(const Rgb<float>& image, const GivenQuarters& quar
       const double mean = (n.mean[0] + n.mean[1] + n.mean[2]) / 3;
       // On the rim of a lamp no neighbour is of the same surface, and the others may be brighter.
       if (value <= mean) continue;
-      if (darkHalf(quarters, i) - mean >= kQuarterShare * (value - mean)) continue;
+      if (darkHalf.at(i) - mean >= kQuarterShare * (value - mean)) continue;
       Spike spike{i};
       for (int c = 0; c < 3; ++c) {
         spike.value[c] = finiteFloat(n.mean[static_cast<size_t>(c)]);
@@ -115,6 +134,21 @@ std::vector<Spike> findSpikes(const Rgb<float>& image, const GivenQuarters& quar
       spikes.push_back(spike);
     }
   return spikes;
+}
+
+Estimate withoutSpikes(const Estimate& estimate, const GivenQuarters& quarters, const Features* features) {
+  Estimate out;
+  out.name = estimate.name;
+  out.correlation = estimate.correlation;
+  out.passes = estimate.passes;
+  out.mean = estimate.mean;
+  for (size_t h = 0; h < 2; ++h) out.half[h] = estimate.half[h];
+  out.variance = meanVariance(estimate);
+  const std::vector<Spike> spikes = findSpikes(out, quarters, features);
+  for (Rgb<float>* image : {&out.mean, &out.half[0], &out.half[1]})
+    if (!image->empty()) replaceValues(*image, spikes);
+  replaceVariances(out.variance, spikes);
+  return out;
 }
 
 void replaceValues(Rgb<float>& image, const std::vector<Spike>& spikes) {

@@ -20,13 +20,15 @@ struct Spike {
 //   - its standard deviation, sqrt(mean_RGB v), is above 8 times the mean of these over 15x15 pixels;
 //   - it is brighter than all of its 5x5 neighbours that are no candidates and lie on the same surface, and than the
 //     mean that would replace it;
-//   - its two darkest quarters show less than 0.3 of the excess over the neighbours' mean: an outlier lives in one or
-//     two quarters, a thin lamp in all four.
+//   - its two darkest quarters, or without quarters its darker half, show less than 0.3 of the excess over the
+//     neighbours' mean: an outlier lives in one or two quarters, a thin lamp in all four.
 // Value and variance are replaced by the means of those neighbours, weighted by nearness and by likeness in albedo and
-// normal. The third condition makes spikes vanish as samples grow: what is there shows in every quarter. Needs the four
-// quarters; without them there are no spikes. `variance` is that of the mean.
-std::vector<Spike> findSpikes(const Rgb<float>& image, const GivenQuarters& quarters, const Rgb<float>& variance,
-                              const Features* features);
+// normal. The third condition makes spikes vanish as samples grow: what is there shows in every quarter. With neither
+// quarters nor halves there are no spikes. The estimate has a variance; the features may be null.
+std::vector<Spike> findSpikes(const Estimate& estimate, const GivenQuarters& quarters, const Features* features);
+
+// What denoisers read of the estimate, its mean, halves and variance, with the spikes replaced.
+Estimate withoutSpikes(const Estimate& estimate, const GivenQuarters& quarters, const Features* features);
 
 // Writes the replacements into an image or into a variance.
 void replaceValues(Rgb<float>& image, const std::vector<Spike>& spikes);

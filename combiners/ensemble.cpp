@@ -26,6 +26,9 @@ const OptionInfo kRelative{
     "ensemble-relative", 1,
     "1: errors relative to the brightness of the unbiased image, as relL2 counts them; 0: the paper's"};
 
+const OptionInfo kPrior{"ensemble-prior", 6,
+                        "Pull of noise towards equal weights: 6 for weights that may be anything; 0: the paper's"};
+
 // Fewer passes leave too few in each half to tell the bases apart.
 constexpr uint64_t kFewestPasses = 8;
 
@@ -46,7 +49,7 @@ class Ensemble : public Method {
     return {quarters ? 50 + 23 * of.bases : 72 + 4 * of.bases, 40 + 4 * of.bases};
   }
   std::vector<OptionInfo> options() const override {
-    return {kPatch, kFilter, kShared, kNonNegative, kFullError, kRelative};
+    return {kPatch, kFilter, kShared, kNonNegative, kFullError, kRelative, kPrior};
   }
   MethodResult run(const MethodInputs& in) const override;
 };
@@ -57,6 +60,7 @@ EnsembleChoices choicesOf(const MethodOptions& options) {
   choices.shared = options.number(kShared) != 0;
   choices.nonNegative = options.number(kNonNegative) != 0;
   choices.fullError = options.number(kFullError) != 0;
+  choices.prior = std::max(0.0, options.number(kPrior));
   return choices;
 }
 

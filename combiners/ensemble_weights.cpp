@@ -3,7 +3,10 @@
 
 #include <algorithm>
 
+#include "combiners/box_mean.h"
+#include "combiners/channel_mean.h"
 #include "combiners/denoise/window.h"
+#include "combiners/error_map.h"
 #include "combiners/finite_float.h"
 #include "combiners/simplex_solver.h"
 #include "renderer/core/error.h"
@@ -26,12 +29,14 @@ void addWeighted(const float* __restrict weight, const float* __restrict image, 
 // Solves the pixels of one tile.
 class TileWeights {
  public:
-  TileWeights(const Estimate& x, const std::vector<const Estimate*>& bases, const EnsembleChoices& choices)
+  TileWeights(const Estimate& x, const std::vector<const Estimate*>& bases, const EnsembleChoices& choices,
+              const Plane<float>& noise)
       : x_(x),
         bases_(bases),
         choices_(choices),
         pairs_(bases.size() * (bases.size() + 1) / 2),
-        terms_(choices.fullError ? 3 : 2) {}
+        terms_(choices.fullError ? 3 : 2),
+        noise_(noise) {}
   void solve(const PixelRect& tile, WeightMaps& out);
 
  private:
@@ -47,6 +52,7 @@ class TileWeights {
   const std::vector<const Estimate*>& bases_;
   const EnsembleChoices& choices_;
   size_t pairs_, terms_;
+  const Plane<float>& noise_;  // what is added to the diagonal of M, by channel; empty: nothing
   // Row `row` of the sums of a pair: those of the rows 0, stride, 2 stride, … of the tile.
   double* sumsOfRow(size_t pair, int row) {
     return sums_.data() + (pair * static_cast<size_t>(rows_) + static_cast<size_t>(row)) * products_.size();
@@ -138,6 +144,7 @@ void TileWeights::sumAlongRows() {
 void TileWeights::writeWeights(size_t c, WeightMaps& out) {
   SimplexSolver solver(bases_.size(), choices_.nonNegative, choices_.improvement);
   const int blocks = rows_ * columns_, stride = choices_.stride;
+  const double channels = choices_.shared ? 3 : 1;
   for (int begin = 0; begin < blocks; begin += SimplexSolver::kLanes) {
     const int lanes = std::min(SimplexSolver::kLanes, blocks - begin);
     size_t pair = 0;
@@ -145,8 +152,12 @@ void TileWeights::writeWeights(size_t c, WeightMaps& out) {
       for (size_t j = 0; j <= i; ++j, ++pair) {
         double* to = solver.entry(i, j);
         std::fill_n(to, SimplexSolver::kLanes, 0.0);
-        for (int l = 0; l < lanes; ++l)
-          to[l] = sumsOfRow(pair, (begin + l) / columns_)[(begin + l) % columns_ * stride];
+        for (int l = 0; l < lanes; ++l) {
+          const int row = (begin + l) / columns_, x = (begin + l) % columns_ * stride;
+          to[l] = sumsOfRow(pair, row)[x];
+          if (i == j && noise_.size() > 0)
+            to[l] += channels * static_cast<double>(noise_.at(tile_.x0 + x, tile_.y0 + row * stride));
+        }
       }
     solver.solve();
     for (size_t b = 0; b < bases_.size(); ++b)
@@ -175,6 +186,17 @@ void TileWeights::solve(const PixelRect& tile, WeightMaps& out) {
   }
 }
 
+// The prior times the mean variance of a half of x over every patch, averaged over channels.
+Plane<float> patchNoise(const Estimate& x, const EnsembleChoices& choices) {
+  if (choices.prior <= 0) return {};
+  const Rgb<float> variance = meanVariance(x);
+  const Plane<float> ofHalf = channelMean(variance, [&](size_t i, size_t c) {
+    const double root = choices.rootWeights ? static_cast<double>((*choices.rootWeights)[i]) : 1.0;
+    return 2 * choices.prior * root * root * static_cast<double>(variance[c][i]);
+  });
+  return boxMean<float>(ofHalf, choices.patchRadius);
+}
+
 }  // namespace
 
 WeightMaps uniformWeights(size_t bases, size_t channels, int width, int height) {
@@ -186,9 +208,10 @@ WeightMaps ensembleWeights(const Estimate& unbiased, const std::vector<const Est
                            const EnsembleChoices& choices) {
   BRAID_ASSERT(choices.stride >= 1 && kTileWidth % choices.stride == 0 && kTileHeight % choices.stride == 0);
   const int width = unbiased.mean.width(), height = unbiased.mean.height();
+  const Plane<float> noise = patchNoise(unbiased, choices);
   WeightMaps out = uniformWeights(bases.size(), choices.shared ? 1 : 3, width, height);
   forEachTile(width, height, kTileWidth, kTileHeight,
-              [&](const PixelRect& tile) { TileWeights(unbiased, bases, choices).solve(tile, out); });
+              [&](const PixelRect& tile) { TileWeights(unbiased, bases, choices, noise).solve(tile, out); });
   return out;
 }
 

@@ -31,6 +31,9 @@ struct EnsembleChoices {
   double improvement = 1e-9;  // see SimplexSolver
   // Square roots of the weights of pixels in the sums over patches; null: all 1.
   const Plane<float>* rootWeights = nullptr;
+  // How much the noise of the unbiased image, which M holds, draws weights towards equal ones; see below. 0: not at
+  // all.
+  double prior = 0;
 };
 
 // Minimises wᵀMw with sum(w) = 1, where M is the sum over a patch, clipped at the borders, of
@@ -39,6 +42,11 @@ struct EnsembleChoices {
 // is the matrix of errors of the halves, plus that constant. `fullError` subtracts ¼ (y_i^A - y_i^B)(y_j^A - y_j^B).
 // One pixel and channel gives M a rank of 2, so with three bases and more its minimiser is not even unique; a patch
 // gives full rank and less noise. All images have halves.
+//
+// Where bases differ by less than the noise of x, M says little of which is better: of two, the best weight is known to
+// a variance of n / D, with D the sum over the patch of (y_1^A - y_2^A)² + (y_1^B - y_2^B)² and n the mean variance of
+// a half of x. Weights that are believed to be 1/N with a variance of s² beforehand add n / (2 s²) |w - 1/N|² to
+// 2 wᵀMw. `prior` is 1 / (2 s²): 6 for weights that may be anything in [0, 1].
 WeightMaps ensembleWeights(const Estimate& unbiased, const std::vector<const Estimate*>& bases,
                            const EnsembleChoices& choices);
 

@@ -281,7 +281,7 @@ TEST_CASE("An outlier in one quarter is replaced, a lamp in all of them stays") 
   const size_t outlier = x.mean[0].index(10, 10), lamp = x.mean[0].index(30, 20);
   setPixel(x, outlier, 50, {197, 1, 1, 1}, 2400);
   setPixel(x, lamp, 50, {49, 51, 50, 50}, 2400);
-  const std::vector<Spike> spikes = findSpikes(x.mean, {&x.quarter}, x.variance, nullptr);
+  const std::vector<Spike> spikes = findSpikes(x, {&x.quarter}, nullptr);
   REQUIRE(spikes.size() == 1);
   CHECK(spikes[0].index == outlier);
   Rgb<float> image = x.mean, variance = x.variance;
@@ -296,13 +296,29 @@ TEST_CASE("An outlier in one quarter is replaced, a lamp in all of them stays") 
     for (Plane<float>& plane : quarter.channel)
       for (size_t i = 0; i < plane.size(); ++i) plane[i] /= 1024;
   given[2][0][outlier] = std::numeric_limits<float>::quiet_NaN();
-  const std::vector<Spike> scaled = findSpikes(x.mean, {&given, 1024}, x.variance, nullptr);
+  const std::vector<Spike> scaled = findSpikes(x, {&given, 1024}, nullptr);
   REQUIRE(scaled.size() == 1);
   CHECK(scaled[0].index == outlier);
-  CHECK(findSpikes(x.mean, {&given, 1}, x.variance, nullptr).size() == 2);  // the lamp's quarters seem dark
+  CHECK(findSpikes(x, {&given, 1}, nullptr).size() == 2);  // the lamp's quarters seem dark
+}
+
+TEST_CASE("Without quarters the halves tell outliers, and without halves nothing does") {
+  Estimate x = flat(1.0f, 1e-4f);
+  const size_t outlier = x.mean[0].index(10, 10), lamp = x.mean[0].index(30, 20);
+  setPixel(x, outlier, 50, {197, 1, 1, 1}, 2400);
+  setPixel(x, lamp, 50, {49, 51, 50, 50}, 2400);
   x.quarter.clear();
-  CHECK(findSpikes(x.mean, {&x.quarter}, x.variance, nullptr).empty());
-  CHECK(findSpikes(x.mean, {}, x.variance, nullptr).empty());
+  const std::vector<Spike> spikes = findSpikes(x, {&x.quarter}, nullptr);
+  REQUIRE(spikes.size() == 1);
+  CHECK(spikes[0].index == outlier);
+  const Estimate clean = withoutSpikes(x, {}, nullptr);
+  for (const Rgb<float>* image : {&clean.mean, &clean.half[0], &clean.half[1]}) {
+    CHECK((*image)[1][outlier] == doctest::Approx(1.0));
+    CHECK((*image)[1][lamp] > 40.0f);
+  }
+  CHECK(clean.variance[1][outlier] == doctest::Approx(1e-4));
+  x.half[0] = x.half[1] = {};
+  CHECK(findSpikes(x, {}, nullptr).empty());
 }
 
 TEST_CASE("An outlier in one quarter leaves nothing in its neighbours either") {
@@ -374,7 +390,7 @@ TEST_CASE("The rim of a lamp, darker than the lamp and noisier than all around i
       setPixel(x, i, value, {value - 0.005f, value + 0.005f, value, value}, rim && (u + y) % 7 == 0 ? 2e-5f : 1e-8f);
       for (size_t c = 0; c < 3; ++c) features.albedo.mean[c][i] = rim ? 0.5f : 1.0f;
     }
-  CHECK(findSpikes(x.mean, {&x.quarter}, x.variance, &features).empty());
+  CHECK(findSpikes(x, {&x.quarter}, &features).empty());
 }
 
 TEST_CASE("A noisy lamp lends the dark pixels around it no error that they cannot have") {

@@ -171,6 +171,37 @@ TEST_CASE("Two denoisers: the weight is the closed form and the best of a grid")
   }
 }
 
+// What EnsembleChoices::prior states, on a grid: with noise, the pull towards equal weights; without, none.
+TEST_CASE("Noise of the unbiased image draws weights towards equal ones, as the prior says") {
+  std::mt19937 random(2);
+  std::normal_distribution<float> gauss;
+  for (int trial = 0; trial < 200; ++trial) {
+    Estimate x = pixel(gauss(random), gauss(random));
+    const float variance = trial % 4 == 0 ? 0.0f : std::exp(gauss(random) - 2);  // of the mean
+    x.variance = Rgb<float>(1, 1, variance);
+    const std::vector<Estimate> y = {pixel(gauss(random), gauss(random)), pixel(gauss(random), gauss(random))};
+    const WeightMaps w = ensembleWeights(x, pointers(y), {.patchRadius = 0, .prior = 6});
+    const auto at = [](const Estimate& e, int h) { return static_cast<double>(e.half[h][0][0]); };
+    double best = 1e300, bestAlpha = 0;
+    for (int k = 0; k <= 1000; ++k) {
+      const double t = k / 1000.0, ea = (1 - t) * at(y[0], 0) + t * at(y[1], 0) - at(x, 1),
+                   eb = (1 - t) * at(y[0], 1) + t * at(y[1], 1) - at(x, 0),
+                   pull = 6 * 2 * static_cast<double>(variance) * (sqr(t - 0.5) + sqr(0.5 - t));
+      if (ea * ea + eb * eb + pull < best) best = ea * ea + eb * eb + pull, bestAlpha = t;
+    }
+    CHECK(std::fabs(static_cast<double>(w.of(1, 0)[0]) - bestAlpha) < 6e-4);
+  }
+  // Among three bases of which two are far off, the noise of x has to be large to matter.
+  Estimate x = pixel(1, 1);
+  const std::vector<Estimate> y = {pixel(1, 1), pixel(3, 3), pixel(-2, -2)};
+  x.variance = Rgb<float>(1, 1, 1e-6f);
+  CHECK(ensembleWeights(x, pointers(y), {.patchRadius = 0, .prior = 6}).of(0, 0)[0] > 0.99f);
+  x.variance = Rgb<float>(1, 1, 1e6f);
+  for (size_t b = 0; b < 3; ++b)
+    CHECK(ensembleWeights(x, pointers(y), {.patchRadius = 0, .prior = 6}).of(b, 0)[0] ==
+          doctest::Approx(1.0 / 3).epsilon(1e-3));
+}
+
 TEST_CASE("Errors of whole images: the minimum, or the better end, of the reduced objective on a grid") {
   std::mt19937 random(5);
   std::normal_distribution<float> gauss;

@@ -2,6 +2,7 @@
 #include "combiners/denoise/alike_range.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "combiners/denoise/window.h"
@@ -12,7 +13,8 @@ namespace braid {
 namespace {
 
 constexpr int kTileWidth = 256, kTileHeight = 8;
-constexpr float kAlike = 12;  // squared normal deviates: 3.5²
+constexpr float kBrighter = 4, kDarker = 12;  // squared normal deviates: 2² and 3.5²
+constexpr float kSlack = 0.1f;
 
 // Widens the range of `count` pixels p by the values of the pixels q that are alike.
 struct PairRows {
@@ -23,7 +25,7 @@ void widen(const PairRows& rows, int count, float* __restrict least, float* __re
   const float *uq = rows.noisyQ, *vq = rows.varianceQ, *value = rows.valueQ;
   for (int x = 0; x < count; ++x) {
     const float d = up[x] - uq[x];
-    const bool alike = d * d <= kAlike * (vp[x] + vq[x]);
+    const bool alike = d * d <= (d < 0 ? kBrighter : kDarker) * (vp[x] + vq[x]);
     least[x] = alike && value[x] < least[x] ? value[x] : least[x];
     most[x] = alike && value[x] > most[x] ? value[x] : most[x];
   }
@@ -45,7 +47,8 @@ void keepTile(Plane<float>& image, const Plane<float>& values, const Plane<float
       }
     for (int x = 0; x < tile.width(); ++x) {
       float& pixel = image.at(tile.x0 + x, y);
-      pixel = std::clamp(pixel, least[static_cast<size_t>(x)], most[static_cast<size_t>(x)]);
+      const float low = least[static_cast<size_t>(x)], high = most[static_cast<size_t>(x)];
+      pixel = std::clamp(pixel, low - kSlack * std::fabs(low), high + kSlack * std::fabs(high));
     }
   }
 }

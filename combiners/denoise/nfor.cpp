@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // First-order regression on features, NFOR (nfor_filter.h). With --nfor-demodulate 0 --nfor-offsets 0 --nfor-stride 1
-// it is the method of the paper.
+// --nfor-despike 0 it is the method of the paper.
 #include <algorithm>
 
 #include "combiners/channel_mean.h"
@@ -17,6 +17,7 @@ const OptionInfo kDemodulate{"nfor-demodulate", 1, "1: regress colours divided b
 const OptionInfo kOffsets{"nfor-offsets", 1, "1: pixel offsets are features too"};
 const OptionInfo kVariance{"nfor-variance", 0,
                            "Variance behind the weights: 0 of the samples, 1 shrunk to a box mean, 2 filtered"};
+const OptionInfo kDespike{"nfor-despike", 1, "0: keep outliers that one half or two quarters alone speak for"};
 const OptionInfo kStride{"nfor-stride", 2, "Distance of the regression models in pixels"};
 
 NforOptions optionsOf(const MethodInputs& in) {
@@ -28,6 +29,8 @@ NforOptions optionsOf(const MethodInputs& in) {
                      : variance == 2 ? NforVariance::NonLocal
                                      : NforVariance::Sample;
   options.stride = static_cast<int>(std::clamp(in.options.number(kStride), 1.0, 9.0));
+  options.despike = in.options.number(kDespike) != 0;
+  options.quarters = in.quarters;
   options.cancel = in.cancel;
   return options;
 }
@@ -50,10 +53,11 @@ class Nfor : public Method {
     needs.passes = 2;
     needs.features = needs.featureNoise = true;
     needs.variance = false;
+    needs.quartersHelp = true;
     return needs;
   }
   MethodMemory memory(const MemoryCase& /*of*/) const override { return {520, 44}; }
-  std::vector<OptionInfo> options() const override { return {kDemodulate, kOffsets, kVariance, kStride}; }
+  std::vector<OptionInfo> options() const override { return {kDemodulate, kOffsets, kVariance, kStride, kDespike}; }
 
   MethodResult run(const MethodInputs& in) const override {
     const Estimate& e = *in.unbiased;
@@ -69,8 +73,11 @@ class Nfor : public Method {
     result.aovs.push_back({"weight.nfor.wide", channelMean(share.width(), share.height(), [&](size_t i, size_t c) {
                              return static_cast<double>(share[c][i]);
                            })});
-    result.remarks = {number(kDemodulate, options.demodulate), number(kOffsets, options.offsets),
-                      number(kVariance, static_cast<double>(options.variance)), number(kStride, options.stride),
+    result.remarks = {number(kDemodulate, options.demodulate),
+                      number(kOffsets, options.offsets),
+                      number(kVariance, static_cast<double>(options.variance)),
+                      number(kStride, options.stride),
+                      number(kDespike, options.despike),
                       filtered.report.attribute("nfor-regression")};
     return result;
   }

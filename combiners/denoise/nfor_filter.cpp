@@ -10,6 +10,7 @@
 #include "combiners/denoise/nlm_filter.h"
 #include "combiners/denoise/nlm_window_weights.h"
 #include "combiners/denoise/variance.h"
+#include "combiners/despike.h"
 #include "combiners/error_map.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
@@ -211,7 +212,9 @@ NforResult nforFilter(const Estimate& estimate, const Features* features, const 
   const int width = estimate.mean.width(), height = estimate.mean.height();
   const FeatureHalves crossed = crossPrefiltered(features);
   const FeatureChannels meanFeatures = prefilteredMean(crossed);
-  const Colours colours = coloursOf(estimate, options.demodulate ? meanFeatures.albedo() : nullptr);
+  const Plane<float>* albedo = options.demodulate ? meanFeatures.albedo() : nullptr;
+  const Colours colours = options.despike ? coloursOf(withoutSpikes(estimate, options.quarters, features), albedo)
+                                          : coloursOf(estimate, albedo);
   const Rgb<float> variance = guideVariance(colours, passesOf(estimate), options.variance);
   Regressor regressor(colours.mean, variance, options);
   NforResult result;

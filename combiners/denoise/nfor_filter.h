@@ -11,6 +11,9 @@
 //   4. The selection of the better bandwidth is filtered and blends the candidates of both halves to R_A and R_B.
 //   5. The mean of R_A and R_B is regressed once more on the mean features, with k = 1 and the variance ¼ (R_A - R_B)².
 //
+// Outliers that one half, or two quarters, alone speak for may be taken out first (despike.h): a regression smears them
+// over its window, and neither their variance nor the other half keeps it from that.
+//
 // What is not in the paper can be turned off, but for the range that fits are kept in (alike_range.h). The ridge is
 // 10⁻³ of the mean diagonal, on features scaled to the window (regression.h): smaller ones fit noise (3 % more error).
 #pragma once
@@ -18,7 +21,7 @@
 #include <atomic>
 
 #include "combiners/regression.h"
-#include "renderer/film/estimates.h"
+#include "renderer/film/combiner.h"
 
 namespace braid {
 
@@ -39,6 +42,8 @@ struct NforOptions {
   // Distance of the models in pixels, >= 1; 1 is the paper's. Beyond, models are blended with a zero-order filter of
   // the same weights, for pixels that resemble no centre nearby.
   int stride = 2;
+  bool despike = false;         // take outliers out first
+  GivenQuarters quarters = {};  // that tell them; without, the halves do
   const std::atomic<bool>* cancel = nullptr;
 };
 

@@ -15,15 +15,20 @@ const OptionInfo kVariance{"rdfc-variance", 0,
                            "Variance of the colour: 0 of the samples (paper, independent samples), 1 rescaled by the "
                            "halves (paper, low-discrepancy samples), 2 shrunk towards its neighbourhood"};
 
+const OptionInfo kDespike{"rdfc-despike", 1, "0: keep outliers that one half or two quarters alone speak for"};
+
 const char* const kCandidateNames[] = {"first", "second", "third"};
 
-RdfcOptions optionsOf(const MethodOptions& numbers) {
+RdfcOptions optionsOf(const MethodInputs& in) {
+  const MethodOptions& numbers = in.options;
   RdfcOptions options;
   options.demodulate = numbers.number(kDemodulate) > 0.5;
   const double variance = numbers.number(kVariance);
   options.variance = variance > 1.5   ? RdfcVariance::Shrunk
                      : variance > 0.5 ? RdfcVariance::Rescaled
                                       : RdfcVariance::Sample;
+  options.despike = numbers.number(kDespike) != 0;
+  options.quarters = in.quarters;
   return options;
 }
 
@@ -39,14 +44,15 @@ class Rdfc : public Method {
     needs.passes = 2;
     needs.features = needs.featureNoise = true;
     needs.halves = needs.variance = false;
+    needs.quartersHelp = true;
     return needs;
   }
   MethodMemory memory(const MemoryCase& /*of*/) const override { return {496, 52}; }
-  std::vector<OptionInfo> options() const override { return {kDemodulate, kVariance}; }
+  std::vector<OptionInfo> options() const override { return {kDemodulate, kVariance, kDespike}; }
 
   MethodResult run(const MethodInputs& in) const override {
     const Estimate& e = *in.unbiased;
-    const RdfcOptions options = optionsOf(in.options);
+    const RdfcOptions options = optionsOf(in);
     if (e.passes == 1 || rdfcVariance(e, options.variance).empty())
       throw Error(ExitCode::BadInput, "rdfc needs the variance of its input, or the halves of at least two passes");
     RdfcResult filtered = rdfcDenoised(e, in.features, options, in.cancel);
@@ -57,7 +63,7 @@ class Rdfc : public Method {
                                                 : errorMap(result.image.half, e, meanVariance(e), result.image.mean);
     for (size_t k = 0; k < filtered.selection.size(); ++k)
       result.aovs.push_back({std::string("weight.rdfc.") + kCandidateNames[k], std::move(filtered.selection[k])});
-    for (const OptionInfo* option : {&kDemodulate, &kVariance}) {
+    for (const OptionInfo* option : {&kDemodulate, &kVariance, &kDespike}) {
       Attribute a;
       a.name = option->name;
       a.kind = Attribute::Kind::Float;

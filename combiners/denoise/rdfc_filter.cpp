@@ -8,6 +8,7 @@
 #include "combiners/denoise/rdfc_features.h"
 #include "combiners/denoise/rdfc_window.h"
 #include "combiners/denoise/variance.h"
+#include "combiners/despike.h"
 #include "renderer/core/error.h"
 
 namespace braid {
@@ -230,7 +231,9 @@ Rgb<float> rdfcVariance(const Estimate& e, RdfcVariance kind) {
 RdfcResult rdfcDenoised(const Estimate& estimate, const Features* features, const RdfcOptions& options,
                         const std::atomic<bool>* cancel) {
   const uint64_t passes = passesOf(estimate);
-  const Colour colour = colourOf(estimate, features, options);
+  const Colour colour = options.despike
+                            ? colourOf(withoutSpikes(estimate, options.quarters, features), features, options)
+                            : colourOf(estimate, features, options);
   BRAID_ASSERT(!colour.variance.empty());
   const RdfcColour mirroredColour = mirrored(colour);
   const std::vector<RdfcGuide> guides = features ? rdfcFeatures(*features, passes, cancel) : std::vector<RdfcGuide>();

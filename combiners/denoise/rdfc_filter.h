@@ -7,7 +7,7 @@
 #include <atomic>
 #include <vector>
 
-#include "renderer/film/estimates.h"
+#include "renderer/film/combiner.h"
 
 namespace braid {
 
@@ -23,6 +23,8 @@ struct RdfcOptions {
   bool demodulate = false;  // divides the colour by the albedo of the first hit, and multiplies it in the end
   RdfcVariance variance = RdfcVariance::Sample;
   bool secondPass = true;
+  bool despike = false;         // take outliers out first (despike.h)
+  GivenQuarters quarters = {};  // that tell them; without, the halves do
 };
 
 struct RdfcResult {
