@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 namespace braid {
 
@@ -16,7 +17,7 @@ constexpr size_t kMostPoints = 8;
 
 double ConvergenceCurve::passesAt(double error) const { return std::exp((std::log(error) - intercept) / slope); }
 
-std::optional<ConvergenceCurve> fitCurve(std::span<const CurvePoint> points, size_t most) {
+std::optional<ConvergenceCurve> fitCurve(std::span<const CurvePoint> points, size_t most, double prior) {
   std::array<double, kMostPoints> x, y;
   const size_t limit = std::min(most, kMostPoints);
   size_t count = 0;
@@ -38,7 +39,7 @@ std::optional<ConvergenceCurve> fitCurve(std::span<const CurvePoint> points, siz
     xy += (x[k] - meanX) * (y[k] - meanY);
   }
   ConvergenceCurve curve;
-  curve.slope = std::clamp(xy / xx, kSteepest, kFlattest);
+  curve.slope = std::clamp((xy - prior) / (xx + prior), kSteepest, kFlattest);
   curve.intercept = meanY - curve.slope * meanX;
   if (!std::isfinite(curve.slope) || !std::isfinite(curve.intercept)) return {};
   return curve;
@@ -49,17 +50,25 @@ ConvergenceCurve curveOfSlope(const CurvePoint& point, double slope) {
 }
 
 double denoisedWeight(std::span<const CurvePoint> history, const CurvePoint& now, double error, double epsilon,
-                      double fallbackSlope, size_t points, const WeightLimits& limits) {
+                      const CurveSettings& settings, const WeightLimits& limits) {
   const CurvePoint last{now.passes, now.variance + epsilon};
   const double risk = error + epsilon;
   const double most = std::min(limits.most, limits.mostRatio * now.passes);
   // Without variance there is nothing to gain from the denoised image.
   if (!(now.variance > 0 && last.variance > 0 && now.passes > 0)) return 0;
   if (!(risk > 0)) return most;
-  std::optional<ConvergenceCurve> curve = fitCurve(history, points);
-  if (!curve) curve = curveOfSlope(last, fallbackSlope);
+  std::optional<ConvergenceCurve> curve = fitCurve(history, settings.points, settings.slopePrior);
+  if (!curve) curve = curveOfSlope(last, settings.fallbackSlope);
   const double w = curve->passesAt(risk);
   return w == w ? std::clamp(w, 0.0, most) : 0.0;
+}
+
+double independentError(double v, double m, double q, double share) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  if (!(v > 0 && v < kInfinity && m < kInfinity) || q != q) return m;
+  const double bound = std::sqrt(v) * std::sqrt(m), covariance = std::clamp(q, -bound, bound);
+  if (share * covariance >= m) return 0;
+  return covariance < v ? v * ((m - share * covariance) / (v - covariance)) : kInfinity;
 }
 
 }  // namespace braid

@@ -24,13 +24,20 @@ struct ConvergenceCurve {
 // The least squares line through the newest points, from the last one backwards for as long as older variances are
 // larger and numbers of passes smaller, and both positive; at most `most` points. The slope is clamped to [-2, -1/4],
 // keeping the line on the centre of the points. Nothing with fewer than two points. `points` are oldest first, and
-// there are at most 8 that count.
-std::optional<ConvergenceCurve> fitCurve(std::span<const CurvePoint> points, size_t most);
+// there are at most 8 that count. `prior` pulls the slope towards -1 like points of their own, with that sum of squared
+// deviations of log I; two points that are a doubling apart have 0.24, four 2.4.
+std::optional<ConvergenceCurve> fitCurve(std::span<const CurvePoint> points, size_t most, double prior = 0);
 
 // The line of a given slope through one point. A slope of -1 is the law of Monte Carlo and gives W = I v / SURE; -2 is
 // what the second point of the paper comes to, V_{N-K} = V_K / (N/K - 1)² at N - K samples for any N and K, and gives
 // W = I sqrt(v / SURE).
 ConvergenceCurve curveOfSlope(const CurvePoint& point, double slope);
+
+struct CurveSettings {
+  double fallbackSlope = -1;  // without a curve
+  double slopePrior = 8;      // of fitCurve()
+  size_t points = 4;          // at most
+};
 
 struct WeightLimits {
   double most = 65536;    // of W, in passes: beyond it the denoised image fades
@@ -41,6 +48,12 @@ struct WeightLimits {
 // point, its variance filtered like the error; `epsilon` is added to both, against 0/0. A pixel where both images are
 // black has any weight, here 0; one that is black in the noisy image only, and without variance, has 0 as well.
 double denoisedWeight(std::span<const CurvePoint> history, const CurvePoint& now, double error, double epsilon,
-                      double fallbackSlope, size_t points, const WeightLimits& limits);
+                      const CurveSettings& settings, const WeightLimits& limits);
+
+// The squared error of an image that has nothing of the noise of n and is worth W passes like d: v (m - s q) / (v - q),
+// for the squared error m of d, made of an n of variance v, whose error has the covariance q with that of d, when s is
+// the share of these passes in those of n by now. With s = 1, the best mean of d and n has the weights v - q of d and
+// m - q of n. From 0, where d has all the weight, to infinity. Covariances beyond sqrt(v m) count as that.
+double independentError(double v, double m, double q, double share = 1);
 
 }  // namespace braid

@@ -38,7 +38,7 @@ MethodResult Easy::run(const MethodInputs& in) const {
   const Estimate &n = *in.unbiased, &d = *in.biased;
   if (!in.redenoise) throw Error(ExitCode::Usage, "needs a denoiser that it can run again as its biased input");
   const double step = std::clamp(in.options.number(kStep), 1e-3, 10.0);
-  const Rgb<float> sure = sureMap(n.mean, d.mean, n.variance, in.seed, step, in.redenoise);
+  const Rgb<float> sure = sureMaps(n.mean, d.mean, n.variance, in.seed, step, in.redenoise).risk;
   const double sigma = mapFilterSigma(n.variance);
   const Rgb<float> v = gaussianFiltered(n.variance, sigma);
   Rgb<float> error = gaussianFiltered(sure, sigma);

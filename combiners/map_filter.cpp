@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "combiners/map_filter.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "combiners/box_mean.h"
 #include "combiners/finite_float.h"
 #include "combiners/sure_map.h"
 #include "renderer/core/parallel.h"
@@ -10,6 +12,9 @@
 namespace braid {
 
 namespace {
+
+constexpr int kWideRadius = 20;
+constexpr double kScatters = 3;
 
 template <class Body>
 void forAllValues(Rgb<float>& map, const Body& body) {
@@ -21,7 +26,7 @@ void forAllValues(Rgb<float>& map, const Body& body) {
 
 }  // namespace
 
-MapFilter::MapFilter(double sigma, const Rgb<float>* level) : sigma_(sigma) {
+MapFilter::MapFilter(double sigma, const Rgb<float>* level, bool pooled) : sigma_(sigma), pooled_(pooled) {
   if (!level) return;
   for (Plane<float>& plane : unit_) plane = Plane<float>(level->width(), level->height(), kUnfilled);
   for (size_t c = 0; c < 3; ++c)
@@ -44,8 +49,33 @@ Rgb<float> MapFilter::operator()(const Rgb<float>& map) const {
   return fromUnits(gaussianFiltered(toUnits(map), sigma_));
 }
 
+Plane<float> MapFilter::pooledRisk(const Plane<float>& sure, const Plane<float>& variance) const {
+  Plane<float> wide = boxMean<float>(sure, kWideRadius);
+  {
+    const Plane<float> wideVariance = boxMean<float>(variance, kWideRadius), near = gaussianFiltered(variance, sigma_);
+    for (size_t i = 0; i < wide.size(); ++i)
+      wide[i] = wideVariance[i] > 0 ? near[i] * std::max(0.0f, wide[i] / wideVariance[i]) : 0;
+  }
+  Plane<float> square = sure;
+  for (float& value : square.data) value *= value;
+  square = gaussianFiltered(square, sigma_);
+  Plane<float> out = gaussianFiltered(sure, sigma_);
+  for (size_t i = 0; i < out.size(); ++i) {
+    const double start = static_cast<double>(wide[i]), mean = static_cast<double>(out[i]), difference = mean - start;
+    const double scatter = std::max(0.0, static_cast<double>(square[i]) - mean * mean) / kMapWindowPixels;
+    const double kept = std::max(0.0, difference * difference - kScatters * scatter);
+    out[i] = kept > 0 ? finiteFloat(std::max(0.0, start + kept / difference)) : wide[i];
+  }
+  return out;
+}
+
 Rgb<float> MapFilter::risk(Rgb<float> sure, const Rgb<float>& variance) const {
   const Rgb<float> unfiltered = toUnits(std::move(sure));
+  if (pooled_) {
+    Rgb<float> risks = toUnits(variance);
+    for (size_t c = 0; c < 3; ++c) risks[c] = pooledRisk(unfiltered[c], risks[c]);
+    return fromUnits(std::move(risks));
+  }
   Rgb<float> filtered = gaussianFiltered(unfiltered, sigma_);
   applySignRule(filtered, unfiltered, toUnits(variance));
   return fromUnits(std::move(filtered));

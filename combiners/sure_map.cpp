@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "combiners/plane_mean.h"
@@ -34,8 +35,8 @@ void forAllValues(const Rgb<float>& image, const Body& body) {
 
 }  // namespace
 
-Rgb<float> sureMap(const Rgb<float>& noisy, const Rgb<float>& denoised, const Rgb<float>& variance, uint64_t seed,
-                   double step, const std::function<Rgb<float>(const Rgb<float>&)>& denoise) {
+SureMaps sureMaps(const Rgb<float>& noisy, const Rgb<float>& denoised, const Rgb<float>& variance, uint64_t seed,
+                  double step, const std::function<Rgb<float>(const Rgb<float>&)>& denoise) {
   const int width = noisy.width(), height = noisy.height();
   Rgb<float> b(width, height), moved[2] = {{width, height}, {width, height}};
   forAllValues(noisy, [&](size_t c, size_t i) {
@@ -45,13 +46,16 @@ Rgb<float> sureMap(const Rgb<float>& noisy, const Rgb<float>& denoised, const Rg
     moved[1][c][i] = noisy[c][i] - static_cast<float>(step) * b[c][i];
   });
   for (Rgb<float>& image : moved) image = denoise(image);
-  Rgb<float> out(width, height);
+  SureMaps out;
+  out.risk = Rgb<float>(width, height);
   forAllValues(noisy, [&](size_t c, size_t i) {
     const double difference = static_cast<double>(denoised[c][i]) - static_cast<double>(noisy[c][i]);
     const double change = static_cast<double>(moved[0][c][i]) - static_cast<double>(moved[1][c][i]);
     const double divergence = static_cast<double>(b[c][i]) * change / step;
-    out[c][i] = static_cast<float>(difference * difference - static_cast<double>(variance[c][i]) + divergence);
+    out.risk[c][i] = static_cast<float>(difference * difference - static_cast<double>(variance[c][i]) + divergence);
+    b[c][i] = static_cast<float>(0.5 * divergence);
   });
+  out.covariance = std::move(b);
   return out;
 }
 
@@ -66,14 +70,13 @@ double mapFilterSigma(const Rgb<float>& variance) {
   return 100 * std::clamp(std::sqrt(sum / static_cast<double>(kept)), 1e-3, 1.0);
 }
 
-Rgb<float> gaussianFiltered(const Rgb<float>& in, double sigma) {
+Plane<float> gaussianFiltered(const Plane<float>& in, double sigma) {
   std::array<double, 2 * kRadius + 1> weight;
   double total = 0;
   for (int d = -kRadius; d <= kRadius; ++d)
     total += weight[static_cast<size_t>(d + kRadius)] = std::exp(-0.5 * d * d / (sigma * sigma));
   for (double& w : weight) w /= total;
-
-  const int width = in.width(), height = in.height();
+  const int width = in.width, height = in.height;
   const auto filtered = [&](const auto& from, auto& to, int dx, int dy) {
     parallelRows(height, [&](int y) {
       for (int x = 0; x < width; ++x) {
@@ -86,12 +89,16 @@ Rgb<float> gaussianFiltered(const Rgb<float>& in, double sigma) {
       }
     });
   };
-  Rgb<float> out(width, height);
   Plane<double> rows(width, height);
-  for (size_t c = 0; c < 3; ++c) {
-    filtered(in[c], rows, 1, 0);
-    filtered(rows, out[c], 0, 1);
-  }
+  Plane<float> out(width, height);
+  filtered(in, rows, 1, 0);
+  filtered(rows, out, 0, 1);
+  return out;
+}
+
+Rgb<float> gaussianFiltered(const Rgb<float>& in, double sigma) {
+  Rgb<float> out;
+  for (size_t c = 0; c < 3; ++c) out[c] = gaussianFiltered(in[c], sigma);
   return out;
 }
 

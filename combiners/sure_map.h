@@ -10,20 +10,29 @@
 
 namespace braid {
 
-// Estimates, per pixel and channel, of the squared error of f(n), where n has the variance v and f is the denoiser:
-//   (f(n) - n)² - v + b (f(n + s b) - f(n - s b)) / s,   b = xi sqrt(v), xi standard normal by `seed`, pixel, channel.
+// Of a denoised image, per pixel and channel. Unfiltered: very noisy, and often negative.
+struct SureMaps {
+  Rgb<float> risk;        // its squared error
+  Rgb<float> covariance;  // of its error and that of the noisy image
+};
+
+// The risk of f(n), where n has the variance v and f is the denoiser, is
+//   (f(n) - n)² - v + 2 q,   q = b (f(n + s b) - f(n - s b)) / (2 s),   b = xi sqrt(v),
+// xi standard normal by `seed`, pixel and channel. By Stein's lemma, q is the covariance.
 // The perturbation has `step` s times the deviation of the pixel mean, so no factor of variance is needed; the
 // antithetic pair removes the even orders of f. The derivative wants a small step: a whole deviation, as is usual for
-// networks, doubles the noise, and filters that are told the variance take it for texture. Unfiltered: very noisy, and
-// often negative.
-Rgb<float> sureMap(const Rgb<float>& noisy, const Rgb<float>& denoised, const Rgb<float>& variance, uint64_t seed,
-                   double step, const std::function<Rgb<float>(const Rgb<float>&)>& denoise);
+// networks, doubles the noise, and filters that are told the variance take it for texture.
+SureMaps sureMaps(const Rgb<float>& noisy, const Rgb<float>& denoised, const Rgb<float>& variance, uint64_t seed,
+                  double step, const std::function<Rgb<float>(const Rgb<float>&)>& denoise);
 
 // Width of the Gaussian for the maps, in pixels: 100 clamp(sqrt(V), 10⁻³, 1), where V is the mean of the variances
 // without the highest 0.1 %, which fireflies would decide. 0.1, the identity, for converged images; a box above 5.
 double mapFilterSigma(const Rgb<float>& variance);
 
 // Gaussian over 11x11 pixels, clamped at the borders, its weights normalised to 1.
+constexpr int kMapWindowPixels = 121;
+constexpr double kBoxSigma = 100;  // gives all of them the same weight, to 0.3 %
+Plane<float> gaussianFiltered(const Plane<float>& in, double sigma);
 Rgb<float> gaussianFiltered(const Rgb<float>& in, double sigma);
 
 // Makes the filtered map not negative, per channel: what is negative becomes 0 where the unfiltered map is lower than

@@ -48,7 +48,7 @@ TEST_CASE("Variance C / I and a known risk: W = I v / SURE") {
     for (const double risk : {0.5, 0.02, 1e-4}) {
       const auto history = law(3, -1, {2, 4, 8, 16, 32});
       const CurvePoint now = history.back();
-      const double w = denoisedWeight(history, now, risk, 0, -2, points, kNoLimits);
+      const double w = denoisedWeight(history, now, risk, 0, {-2, 0, points}, kNoLimits);
       CHECK(w == doctest::Approx(32 * now.variance / risk).epsilon(1e-9));
     }
 }
@@ -90,20 +90,20 @@ TEST_CASE("The second point of the paper is slope -2 in disguise, and the fallba
     }
   const CurvePoint now{64, 0.25};
   const std::vector<CurvePoint> alone = {now};
-  CHECK(denoisedWeight(alone, now, 0.01, 0, -2, 4, kNoLimits) == doctest::Approx(64 * std::sqrt(0.25 / 0.01)));
-  CHECK(denoisedWeight(alone, now, 0.01, 0, -1, 4, kNoLimits) == doctest::Approx(64 * 0.25 / 0.01));
+  CHECK(denoisedWeight(alone, now, 0.01, 0, {-2, 0, 4}, kNoLimits) == doctest::Approx(64 * std::sqrt(0.25 / 0.01)));
+  CHECK(denoisedWeight(alone, now, 0.01, 0, {-1, 0, 4}, kNoLimits) == doctest::Approx(64 * 0.25 / 0.01));
   // Half as aggressive in logarithms.
-  CHECK(denoisedWeight(alone, now, 0.25, 0, -2, 4, kNoLimits) == doctest::Approx(64));
+  CHECK(denoisedWeight(alone, now, 0.25, 0, {-2, 0, 4}, kNoLimits) == doctest::Approx(64));
 }
 
 TEST_CASE("W is finite and within its limits whatever the pixel holds") {
   const CurvePoint now{64, 0.25};
   const std::vector<CurvePoint> alone = {now};
   const WeightLimits limits;
-  CHECK(denoisedWeight(alone, now, 0, 0, -2, 4, limits) == 64 * 64);
-  CHECK(denoisedWeight(alone, now, 1e-30, 0, -1, 4, limits) == 64 * 64);
+  CHECK(denoisedWeight(alone, now, 0, 0, {-2, 0, 4}, limits) == 64 * 64);
+  CHECK(denoisedWeight(alone, now, 1e-30, 0, {-1, 0, 4}, limits) == 64 * 64);
   const CurvePoint late{100000, 0.25};
-  CHECK(denoisedWeight({&late, 1}, late, 0, 1e-9, -1, 4, limits) == 65536);
+  CHECK(denoisedWeight({&late, 1}, late, 0, 1e-9, {-1, 0, 4}, limits) == 65536);
   const double extremes[] = {0, 1e-45, 1e-38, 1e-12, 1, 1e18, 1e300, std::numeric_limits<double>::infinity()};
 #if defined(__SSE__)
   // As in the threads of a render, which flush subnormals to 0: the published code came to log(0) there.
@@ -115,7 +115,7 @@ TEST_CASE("W is finite and within its limits whatever the pixel holds") {
       for (const double epsilon : {0.0, 1e-30, 1e-6})
         for (const double passes : {0.0, 1.0, 16.0, 1e12}) {
           const std::vector<CurvePoint> history = {{passes / 2, 2 * v}, {passes, v}};
-          const double w = denoisedWeight(history, {passes, v}, risk, epsilon, -2, 4, limits);
+          const double w = denoisedWeight(history, {passes, v}, risk, epsilon, {-2, 0, 4}, limits);
           CHECK(std::isfinite(w));
           CHECK(w >= 0);
           CHECK(w <= 65536);
@@ -124,8 +124,8 @@ TEST_CASE("W is finite and within its limits whatever the pixel holds") {
   _mm_setcsr(mode);
 #endif
   // A pixel without variance, black or not, keeps its noisy value, which it has for certain.
-  CHECK(denoisedWeight({}, {64, 0}, 0, 1e-6, -2, 4, limits) == 0);
-  CHECK(denoisedWeight({}, {64, 0}, 0, 0, -2, 4, limits) == 0);
+  CHECK(denoisedWeight({}, {64, 0}, 0, 1e-6, {-2, 0, 4}, limits) == 0);
+  CHECK(denoisedWeight({}, {64, 0}, 0, 0, {-2, 0, 4}, limits) == 0);
 }
 
 TEST_CASE("Everywhere black stays black, and a lamp without noise keeps its value") {
@@ -273,7 +273,7 @@ TEST_CASE("The risk estimate probes with the deviation of the pixel, so it scale
       return out;
     };
     const Rgb<float> d = halve(c.pt().mean);
-    const Rgb<float> sure = sureMap(c.pt().mean, d, c.pt().variance, 1, 0.1, halve);
+    const Rgb<float> sure = sureMaps(c.pt().mean, d, c.pt().variance, 1, 0.1, halve).risk;
     double estimated = 0, sum = 0, square = 0;
     for (size_t k = 0; k < 3; ++k)
       for (size_t i = 0; i < d.size(); ++i) {

@@ -137,7 +137,7 @@ TEST_CASE("The mean of the SURE map is the error of a linear denoiser") {
     const Case c = makeCase(o);
     const auto denoise = [](const Rgb<float>& image) { return detail::boxFilter(image, 2); };
     const Rgb<float> d = denoise(c.pt().mean);
-    const double sure = meanOfImage(sureMap(c.pt().mean, d, c.pt().variance, seed, 0.1, denoise));
+    const double sure = meanOfImage(sureMaps(c.pt().mean, d, c.pt().variance, seed, 0.1, denoise).risk);
     differences.push_back(sure - meanSquaredError(d, c.truth));
     error += meanSquaredError(d, c.truth) / 24;
   }
