@@ -8,6 +8,7 @@
 #include <doctest/doctest.h>
 
 #include "renderer/core/error.h"
+#include "renderer/core/hash.h"
 #include "renderer/film/exr.h"
 #include "tests/gltf_fixture.h"
 #include "tests/render_fixture.h"
@@ -155,6 +156,27 @@ TEST_CASE("A sweep has one row a cell, and deleted rows come back with the same 
   // Nothing left to do: the rows, times included, stay as they are.
   const std::string before = text(csv);
   REQUIRE(runSweep(o, methods, test::integrators(), out) == 0);
+  CHECK(text(csv) == before);
+}
+
+TEST_CASE("A table that is read and written again keeps its bytes") {
+  const Folder folder;
+  const std::string csv = (folder.path / "sweep.csv").string();
+  SweepTable table;
+  for (uint64_t seed = 0; seed < 2000; ++seed) {
+    SweepRow row;
+    row.scene = "cornell";
+    row.method = "pt";
+    row.seed = seed;
+    const auto random = [&](uint64_t k) { return static_cast<double>(hashCombine(seed, k) >> 11) * 0x1p-53; };
+    row.render = random(0);
+    row.denoise = 0.01 * random(1);
+    row.combine = 10 * random(2);
+    table.rows.push_back(row);
+  }
+  writeSweepTable(csv, table);
+  const std::string before = text(csv);
+  writeSweepTable(csv, readSweepTable(csv));
   CHECK(text(csv) == before);
 }
 

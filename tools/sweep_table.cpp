@@ -106,7 +106,10 @@ std::string csvHeader(const SweepTable& table) {
   return line + "\n";
 }
 
-std::string csvLine(const SweepRow& r) {
+std::string csvLine(const SweepRow& row) {
+  // Their sum is that of the times as they are written, so that a row that was read is written with the same bytes.
+  SweepRow r = row;
+  for (double* seconds : {&r.render, &r.denoise, &r.combine}) *seconds = std::stod(fmt::format("{:.6g}", *seconds));
   std::string line = fmt::format("{},{},{},{},{},{},{:.6g},{:.6g},{:.6g},{:.6g}", r.scene, r.method, toString(r.ladder),
                                  numberText(r.mark), r.spp, r.seed, r.seconds(), r.render, r.denoise, r.combine);
   for (double v : r.values) line += "," + numberText(v);
