@@ -228,6 +228,7 @@ TEST_CASE("Images from gradients are crossed: their halves meet the other halves
   c.estimates.estimates[1].correlation = Correlation::Gradients;
   MethodInputs in = inputsOf(c);
   in.options.set("uncorrelated-gamma", 0.2);
+  in.options.set("uncorrelated-measured", 0);
   const MethodResult r = make_uncorrelated()->run(in);
   const Estimate &y = c.pt(), &z = c.crn();
   const Rgb<float> levels = noiseLevels(y.mean, y.variance);

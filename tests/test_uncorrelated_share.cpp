@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// How much of the uncorrelated combination is taken: what its halves show to be of use.
+#include <cmath>
+#include <string>
+
+#include <doctest/doctest.h>
+
+#include "combiners/registry.h"
+#include "combiners/uncorrelated_share.h"
+#include "tests/combiner_fixture.h"
+
+using namespace braid;
+using namespace braid::test;
+
+namespace {
+
+double meanOf(const Plane<float>& p) {
+  double sum = 0;
+  for (const float v : p.data) sum += static_cast<double>(v);
+  return sum / static_cast<double>(p.size());
+}
+
+// y + factor (e - y), where e has errors like those of y but independent of them.
+Rgb<float> mixedHalf(const Case& c, const Case& other, size_t h, float factor) {
+  Rgb<float> out = c.pt().half[h];
+  for (size_t k = 0; k < 3; ++k)
+    for (size_t i = 0; i < out.size(); ++i) {
+      const float e = c.truth[k][i] + 3 * (other.pt().half[h][k][i] - c.truth[k][i]);
+      out[k][i] += factor * (e - out[k][i]);
+    }
+  return out;
+}
+
+MethodResult run(const Case& c, double measured) {
+  MethodInputs in = inputsOf(c);
+  in.options.set("uncorrelated-measured", measured);
+  return make_uncorrelated()->run(in);
+}
+
+}  // namespace
+
+TEST_CASE("The share is that of the best mean: all of what is better, a tenth of three times the deviation") {
+  CaseOptions o;
+  o.width = o.height = 96;
+  o.constant = 1;
+  const Case c = makeCase(o);
+  o.seed = 2;
+  const Case other = makeCase(o);
+  const Estimate& y = c.pt();
+  const Rgb<float> exact[2] = {c.truth, c.truth}, same[2] = {y.half[0], y.half[1]};
+  const Rgb<float> worse[2] = {mixedHalf(c, other, 0, 1), mixedHalf(c, other, 1, 1)};
+  const Rgb<float> mixed[2] = {mixedHalf(c, other, 0, 0.05f), mixedHalf(c, other, 1, 0.05f)};
+  for (size_t k = 0; k < 3; ++k) {
+    CHECK(meanOf(combinedShares(y, y.mean, exact, y.variance)[k]) == doctest::Approx(1));
+    CHECK(meanOf(combinedShares(y, y.mean, same, y.variance)[k]) == 1);
+    // Of 225 pairs of samples each; a regression's own noise bends clamped shares by less than the tolerance.
+    CHECK(meanOf(combinedShares(y, y.mean, worse, y.variance)[k]) == doctest::Approx(0.1).epsilon(0.2));
+    CHECK(meanOf(combinedShares(y, y.mean, worse, {})[k]) == doctest::Approx(0.1).epsilon(0.2));
+    // The best mean has a tenth of the other image, twice of what is in it.
+    CHECK(meanOf(combinedShares(y, y.mean, mixed, y.variance)[k]) > 0.9);
+  }
+}
+
+// Its differences are no better than its pixels: every pixel has noise of its own.
+TEST_CASE("A correlated image that is much noisier does no harm") {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    CaseOptions o;
+    o.width = 96;
+    o.height = 72;
+    o.seed = seed;
+    o.noise = 0.25;
+    Case c = makeCase(o);
+    o.seed = seed + 10;
+    o.noise = 4;
+    Estimate& z = c.estimates.estimates[1];
+    z = makeCase(o).pt();
+    z.name = "crn";
+    z.correlation = Correlation::CommonRandomNumbers;
+    const auto errorOf = [&](const MethodResult& r) { return meanSquaredError(r.image.mean, c.truth); };
+    const double all = errorOf(run(c, 0)), measured = errorOf(run(c, 1)),
+                 alone = meanSquaredError(c.pt().mean, c.truth);
+    MESSAGE("squared error of all ", all, ", measured ", measured, ", independent image ", alone);
+    CHECK(measured < 1.02 * alone);
+    CHECK(all > 2 * alone);
+  }
+}
+
+TEST_CASE("The sign of the differences does not matter, and images that agree stay what they are") {
+  const Case c = makeCase();
+  Estimate swapped = c.pt();
+  std::swap(swapped.half[0], swapped.half[1]);
+  const Rgb<float> x[2] = {c.crn().half[0], c.crn().half[1]}, back[2] = {x[1], x[0]};
+  const auto a = combinedShares(c.pt(), c.crn().mean, x, c.pt().variance),
+             b = combinedShares(swapped, c.crn().mean, back, c.pt().variance);
+  for (size_t k = 0; k < 3; ++k)
+    for (size_t i = 0; i < a[k].size(); ++i) {
+      CHECK(a[k][i] == b[k][i]);
+      CHECK((a[k][i] >= 0 && a[k][i] <= 1));
+    }
+}
+
+// One sample of half A of the independent image carries all the light of a pixel; its neighbours take their parts.
+TEST_CASE("A rare strong sample is shared out and not lost") {
+  CaseOptions o;
+  o.width = o.height = 64;
+  o.constant = 1;
+  const Case quiet = makeCase(o);
+  Case c = makeCase(o);
+  Estimate& y = c.estimates.estimates[0];
+  const float excess = 400;
+  for (size_t k = 0; k < 3; ++k) {
+    y.mean[k].at(32, 32) += excess;
+    y.half[0][k].at(32, 32) += 2 * excess;
+    y.quarter[0][k].at(32, 32) += 4 * excess;
+    y.variance[k].at(32, 32) += excess * excess;
+  }
+  const MethodResult with = run(c, 1), without = run(quiet, 1);
+  for (size_t k = 0; k < 3; ++k) {
+    const double kept = (meanOf(with.image.mean[k]) - meanOf(without.image.mean[k])) * 64 * 64;
+    CHECK(kept > 0.9 * static_cast<double>(excess));
+    CHECK(kept < 1.1 * static_cast<double>(excess));
+    CHECK(with.image.mean[k].at(32, 32) < 0.1f * excess);
+  }
+}
