@@ -30,10 +30,11 @@ SureMaps sureMaps(const Rgb<float>& noisy, const Rgb<float>& denoised, const Rgb
 double mapFilterSigma(const Rgb<float>& variance);
 
 // Gaussian over 11x11 pixels, clamped at the borders, its weights normalised to 1.
-constexpr int kMapWindowPixels = 121;
-constexpr double kBoxSigma = 100;  // gives all of them the same weight, to 0.3 %
 Plane<float> gaussianFiltered(const Plane<float>& in, double sigma);
 Rgb<float> gaussianFiltered(const Rgb<float>& in, double sigma);
+// With this sigma it is the plain mean of so many pixels, to 0.3 %.
+constexpr double kBoxSigma = 100;
+constexpr int kMapWindowPixels = 121;
 
 // Makes the filtered map not negative, per channel: what is negative becomes 0 where the unfiltered map is lower than
 // the variance on average, that is where the denoiser helps, and its absolute value otherwise.

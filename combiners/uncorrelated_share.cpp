@@ -62,7 +62,8 @@ void takeShare(Rgb<float>& combined, const Rgb<float>& independent, const std::a
   for (size_t c = 0; c < 3; ++c)
     parallelChunks(combined.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i)
-        combined[c][i] = independent[c][i] + share[c][i] * (combined[c][i] - independent[c][i]);
+        combined[c][i] =
+            finiteFloat(static_cast<double>(independent[c][i] + share[c][i] * (combined[c][i] - independent[c][i])));
     });
 }
 

@@ -12,9 +12,9 @@ namespace braid {
 // samples: for every channel, the a in [0, 1] that minimises Σ u (y + a (x - y))² with y = y_A - y_B and x = x_A - x_B,
 // over the 15x15 pixels around every pixel, mirrored at the borders:
 //   a = Σ u y (y - x) / Σ u (y - x)²,   1 where both agree.
-// It does not change with the sign of the differences, nor does their law, hence no bias, by the argument of the paper
-// for its weights. A rare strong sample is not lost: where its neighbours have taken their parts of it, it is in the
-// window of all of them, for that is as wide as the filter's.
+// It does not change with the sign of the differences; where their law does not either, there is no bias, by the
+// argument of the paper for its weights. A rare strong sample is not lost: where its neighbours have taken their parts
+// of it, it is in the window of all of them, for that is as wide as the filter's.
 //
 // u is one over the deviation of y (`noise`: noiseLevels(); empty: 1) times the root of level² + 0.01. Of the latter
 // alone, a lamp decides about the dark beside it; of the noise alone, one whose samples are rare and strong does.
