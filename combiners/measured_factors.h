@@ -10,11 +10,11 @@
 namespace braid {
 
 // For every channel and the block of (2 radius + 1)² pixels, mirrored at the borders, around every pixel, the f in
-// [0, 1] that minimises Σ (y^A + f (x^A - y^A) - x^B)² plus the same with the halves exchanged:
-//   f = Σ (x^A - y^A) (x^B - y^A) / Σ (x^A - y^A)²,
-// 0 where X and Y agree. The noise of a half is larger than that of the whole, hence f is rather too small, and James
-// and Stein's factor larger, unless Y's errors are those of X. Pixels with a positive `gate` count for nothing; it may
-// be empty.
+// [0, 1] that minimises Σ u (y^A + f (x^A - y^A) - x^B)² plus the same with the halves exchanged:
+//   f = Σ u (x^A - y^A) (x^B - y^A) / Σ u (x^A - y^A)²,
+// 0 where X and Y agree. u is one over squareUnits() of both images and of usualVariance() of x, if it has a variance.
+// The noise of a half is larger than that of the whole, hence f is rather too small, and James and Stein's factor
+// larger, unless Y's errors are those of X. Pixels with a positive `gate` count for nothing; it may be empty.
 std::array<Plane<float>, 3> measuredFactors(const Estimate& x, const Rgb<float> (&y)[2], const Plane<float>& gate,
                                             int radius);
 

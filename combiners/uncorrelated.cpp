@@ -44,7 +44,7 @@ class Uncorrelated : public Method {
     needs.variance = false;
     return needs;
   }
-  MethodMemory memory(const MemoryCase& /*of*/) const override { return {72, 40}; }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {76, 40}; }
   std::vector<OptionInfo> options() const override { return {kGamma, kMostNoise, kMeasured}; }
   MethodResult run(const MethodInputs& in) const override;
 };

@@ -16,10 +16,7 @@ namespace braid {
 // argument of the paper for its weights. A rare strong sample is not lost: where its neighbours have taken their parts
 // of it, it is in the window of all of them, for that is as wide as the filter's.
 //
-// u is one over the deviation of y (`noise`: noiseLevels(); empty: 1) times the root of level² + 0.01. Of the latter
-// alone, a lamp decides about the dark beside it; of the noise alone, one whose samples are rare and strong does.
-// The level is the squared mean root of y and z over 7x7 pixels, in which outliers do not count for more than the
-// level that they hide.
+// u is one over squareUnits() of y, z and `noise`, noiseLevels() or empty.
 std::array<Plane<float>, 3> combinedShares(const Estimate& y, const Rgb<float>& z, const Rgb<float> (&combined)[2],
                                            const Rgb<float>& noise);
 

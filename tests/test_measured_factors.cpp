@@ -7,6 +7,8 @@
 
 #include "combiners/measured_factors.h"
 #include "combiners/registry.h"
+#include "combiners/shrinkage.h"
+#include "combiners/square_units.h"
 #include "tests/combiner_fixture.h"
 
 using namespace braid;
@@ -21,6 +23,7 @@ TEST_CASE("Measured factors are the best ones for the other half, by block and c
   for (const int centre : {10, 20})
     for (size_t ch = 0; ch < 3; ++ch) {
       // The error is a parabola in f: its minimum from three values.
+      const Plane<double> unit = squareUnits(x.mean[ch], y.mean[ch], usualVariance(x.variance[ch]));
       const auto error = [&](double f) {
         double sum = 0;
         for (int v = 10 - 2; v <= 10 + 2; ++v)
@@ -28,13 +31,45 @@ TEST_CASE("Measured factors are the best ones for the other half, by block and c
             for (int h = 0; h < 2 && gate.at(u, v) == 0; ++h) {
               const auto own = static_cast<double>(x.half[h][ch].at(u, v)),
                          target = static_cast<double>(y.half[h][ch].at(u, v));
-              sum += sqr(target + f * (own - target) - static_cast<double>(x.half[1 - h][ch].at(u, v)));
+              sum += sqr(target + f * (own - target) - static_cast<double>(x.half[1 - h][ch].at(u, v))) / unit.at(u, v);
             }
         return sum;
       };
       const double a = error(-1), b = error(0), d = error(1), best = 0.5 * (a - d) / (a - 2 * b + d);
       CHECK(factors[ch].at(centre, 10) == doctest::Approx(std::clamp(best, 0.0, 1.0)).epsilon(1e-6));
     }
+}
+
+TEST_CASE("Gated pixels count for nothing, and a lamp does not hide what is wrong beside it") {
+  Case c = makeCase();
+  Estimate& x = c.estimates.estimates[0];
+  const Estimate& y = c.find("narrow");
+  Plane<float> gate(x.mean.width(), x.mean.height());
+  gate.at(12, 9) = 1;
+  const auto before = measuredFactors(x, y.half, gate, 2);
+  for (size_t ch = 0; ch < 3; ++ch) x.half[0][ch].at(12, 9) += 1000;
+  const auto after = measuredFactors(x, y.half, gate, 2), open = measuredFactors(x, y.half, {}, 2);
+  for (size_t ch = 0; ch < 3; ++ch) {
+    CHECK(after[ch].data == before[ch].data);
+    CHECK(open[ch].data != before[ch].data);
+  }
+  // In the left half, dark, Y is wrong by five deviations; the right half is a lamp with noise alone.
+  CaseOptions o;
+  o.width = o.height = 32;
+  o.samples = 64;
+  o.constant = 1;
+  Case lamp = makeCase(o);
+  Estimate& n = lamp.estimates.estimates[0];
+  Rgb<float> wrong[2] = {lamp.truth, lamp.truth};
+  for (size_t ch = 0; ch < 3; ++ch)
+    for (int v = 0; v < 32; ++v)
+      for (int u = 0; u < 32; ++u) {
+        const float scale = u < 16 ? 0.1f : 100;
+        for (Rgb<float>* image : {&n.mean, &n.half[0], &n.half[1]}) (*image)[ch].at(u, v) *= scale;
+        n.variance[ch].at(u, v) *= scale * scale;
+        for (Rgb<float>& image : wrong) image[ch].at(u, v) = u < 16 ? 0.1f * 2.25f : 100;
+      }
+  CHECK(measuredFactors(n, wrong, {}, 7)[0].at(13, 16) > 0.5f);
 }
 
 TEST_CASE("Noise that a biased image has of the unbiased one hides less of its error from measured factors") {
