@@ -161,18 +161,6 @@ Attribute countRemark(const char* name, size_t count) {
   return a;
 }
 
-// What the steps after the first read of an estimate whose halves tell something.
-Estimate whatIsRead(const Estimate& e) {
-  Estimate out;
-  out.name = e.name;
-  out.correlation = e.correlation;
-  out.passes = e.passes;
-  out.mean = e.mean;
-  for (size_t h = 0; h < 2; ++h) out.half[h] = e.half[h];
-  out.variance = meanVariance(e);
-  return out;
-}
-
 void addTo(Plane<float>& sum, const Plane<float>& other) {
   for (size_t i = 0; i < sum.size(); ++i)
     sum[i] = finiteFloat(static_cast<double>(sum[i]) + static_cast<double>(other[i]));

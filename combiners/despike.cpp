@@ -137,13 +137,7 @@ std::vector<Spike> findSpikes(const Estimate& estimate, const GivenQuarters& qua
 }
 
 Estimate withoutSpikes(const Estimate& estimate, const GivenQuarters& quarters, const Features* features) {
-  Estimate out;
-  out.name = estimate.name;
-  out.correlation = estimate.correlation;
-  out.passes = estimate.passes;
-  out.mean = estimate.mean;
-  for (size_t h = 0; h < 2; ++h) out.half[h] = estimate.half[h];
-  out.variance = meanVariance(estimate);
+  Estimate out = whatIsRead(estimate);
   const std::vector<Spike> spikes = findSpikes(out, quarters, features);
   for (Rgb<float>* image : {&out.mean, &out.half[0], &out.half[1]})
     if (!image->empty()) replaceValues(*image, spikes);

@@ -51,6 +51,17 @@ Rgb<float> meanVariance(const Estimate& e) {
   return out;
 }
 
+Estimate whatIsRead(const Estimate& e) {
+  Estimate out;
+  out.name = e.name;
+  out.correlation = e.correlation;
+  out.passes = e.passes;
+  out.mean = e.mean;
+  for (size_t h = 0; h < 2; ++h) out.half[h] = e.half[h];
+  out.variance = meanVariance(e);
+  return out;
+}
+
 bool hasHalves(const Estimate& e) { return !e.half[0].empty() && !e.half[1].empty(); }
 
 Rgb<float> halfVariance(const Estimate& x, const Rgb<float>& variance, int h) {

@@ -9,6 +9,9 @@ namespace braid {
 // The variance of the mean: the estimate's own, or (A - B)² / 4 where it brings none.
 Rgb<float> meanVariance(const Estimate& estimate);
 
+// Name, passes, mean, halves and meanVariance() of the estimate: what filters and combiners read of it.
+Estimate whatIsRead(const Estimate& estimate);
+
 bool hasHalves(const Estimate& estimate);
 
 // The variance of half h (0 or 1), as far as combiners should trust it. Both halves together have 4 v, where v is the

@@ -53,19 +53,23 @@ Plane<float> MapFilter::pooledRisk(const Plane<float>& sure, const Plane<float>&
   Plane<float> wide = boxMean<float>(sure, kWideRadius);
   {
     const Plane<float> wideVariance = boxMean<float>(variance, kWideRadius), near = gaussianFiltered(variance, sigma_);
-    for (size_t i = 0; i < wide.size(); ++i)
-      wide[i] = wideVariance[i] > 0 ? near[i] * std::max(0.0f, wide[i] / wideVariance[i]) : 0;
+    parallelChunks(wide.size(), kPixelChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i)
+        wide[i] = wideVariance[i] > 0 ? near[i] * std::max(0.0f, wide[i] / wideVariance[i]) : 0;
+    });
   }
   Plane<float> square = sure;
   for (float& value : square.data) value *= value;
   square = gaussianFiltered(square, sigma_);
   Plane<float> out = gaussianFiltered(sure, sigma_);
-  for (size_t i = 0; i < out.size(); ++i) {
-    const double start = static_cast<double>(wide[i]), mean = static_cast<double>(out[i]), difference = mean - start;
-    const double scatter = std::max(0.0, static_cast<double>(square[i]) - mean * mean) / kMapWindowPixels;
-    const double kept = std::max(0.0, difference * difference - kScatters * scatter);
-    out[i] = kept > 0 ? finiteFloat(std::max(0.0, start + kept / difference)) : wide[i];
-  }
+  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      const double start = static_cast<double>(wide[i]), mean = static_cast<double>(out[i]), difference = mean - start;
+      const double scatter = std::max(0.0, static_cast<double>(square[i]) - mean * mean) / kMapWindowPixels;
+      const double kept = std::max(0.0, difference * difference - kScatters * scatter);
+      out[i] = kept > 0 ? finiteFloat(std::max(0.0, start + kept / difference)) : wide[i];
+    }
+  });
   return out;
 }
 

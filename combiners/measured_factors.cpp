@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "combiners/measured_factors.h"
 
-#include <algorithm>
+#include <utility>
 
-#include "combiners/finite_float.h"
-#include "combiners/mirror.h"
 #include "combiners/shrinkage.h"
 #include "combiners/square_units.h"
+#include "combiners/window_ratio.h"
 
 namespace braid {
 
@@ -14,7 +13,9 @@ namespace {
 
 Plane<double> unitsOf(const Estimate& x, const Rgb<float> (&y)[2], size_t c) {
   Plane<float> mean(x.mean.width(), x.mean.height(), kUnfilled);
-  for (size_t i = 0; i < mean.size(); ++i) mean[i] = 0.5f * (y[0][c][i] + y[1][c][i]);
+  parallelChunks(mean.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) mean[i] = 0.5f * (y[0][c][i] + y[1][c][i]);
+  });
   return squareUnits(x.mean[c], mean, x.variance.empty() ? Plane<float>() : usualVariance(x.variance[c]));
 }
 
@@ -35,13 +36,7 @@ std::array<Plane<float>, 3> measuredFactors(const Estimate& x, const Rgb<float> 
         squares[i] = (sqr(xa - ya) + sqr(xb - yb)) / unit[i];
       }
     });
-    products = mirrorBoxMean(products, radius);
-    squares = mirrorBoxMean(squares, radius);
-    out[c] = Plane<float>(x.mean.width(), x.mean.height(), kUnfilled);
-    parallelChunks(products.size(), kPixelChunk, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i)
-        out[c][i] = squares[i] > 0 ? finiteFloat(std::clamp(products[i] / squares[i], 0.0, 1.0)) : 0.0f;
-    });
+    out[c] = windowRatio(std::move(products), std::move(squares), radius, 0);
   }
   return out;
 }

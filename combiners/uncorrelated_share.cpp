@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "combiners/uncorrelated_share.h"
 
-#include <algorithm>
+#include <utility>
 
 #include "combiners/finite_float.h"
-#include "combiners/mirror.h"
 #include "combiners/square_units.h"
+#include "combiners/window_ratio.h"
 
 namespace braid {
 
@@ -29,13 +29,7 @@ std::array<Plane<float>, 3> combinedShares(const Estimate& y, const Rgb<float>& 
         squares[i] = sqr(dy - dx) / unit[i];
       }
     });
-    out[c] = Plane<float>(unit.width, unit.height, kUnfilled);
-    products = mirrorBoxMean(products, kRadius);
-    squares = mirrorBoxMean(squares, kRadius);
-    parallelChunks(products.size(), kPixelChunk, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i)
-        out[c][i] = squares[i] > 0 ? finiteFloat(std::clamp(products[i] / squares[i], 0.0, 1.0)) : 1.0f;
-    });
+    out[c] = windowRatio(std::move(products), std::move(squares), kRadius, 1);
   }
   return out;
 }

@@ -5,6 +5,7 @@
 
 #include <doctest/doctest.h>
 
+#include "combiners/plane_mean.h"
 #include "combiners/registry.h"
 #include "combiners/uncorrelated_share.h"
 #include "tests/combiner_fixture.h"
@@ -13,12 +14,6 @@ using namespace braid;
 using namespace braid::test;
 
 namespace {
-
-double meanOf(const Plane<float>& p) {
-  double sum = 0;
-  for (const float v : p.data) sum += static_cast<double>(v);
-  return sum / static_cast<double>(p.size());
-}
 
 // y + factor (e - y), where e has errors like those of y but independent of them.
 Rgb<float> mixedHalf(const Case& c, const Case& other, size_t h, float factor) {
@@ -51,13 +46,13 @@ TEST_CASE("The share is that of the best mean: all of what is better, a tenth of
   const Rgb<float> worse[2] = {mixedHalf(c, other, 0, 1), mixedHalf(c, other, 1, 1)};
   const Rgb<float> mixed[2] = {mixedHalf(c, other, 0, 0.05f), mixedHalf(c, other, 1, 0.05f)};
   for (size_t k = 0; k < 3; ++k) {
-    CHECK(meanOf(combinedShares(y, y.mean, exact, y.variance)[k]) == doctest::Approx(1));
-    CHECK(meanOf(combinedShares(y, y.mean, same, y.variance)[k]) == 1);
+    CHECK(planeMean(combinedShares(y, y.mean, exact, y.variance)[k]) == doctest::Approx(1));
+    CHECK(planeMean(combinedShares(y, y.mean, same, y.variance)[k]) == 1);
     // Of 225 pairs of samples each; a regression's own noise bends clamped shares by less than the tolerance.
-    CHECK(meanOf(combinedShares(y, y.mean, worse, y.variance)[k]) == doctest::Approx(0.1).epsilon(0.2));
-    CHECK(meanOf(combinedShares(y, y.mean, worse, {})[k]) == doctest::Approx(0.1).epsilon(0.2));
+    CHECK(planeMean(combinedShares(y, y.mean, worse, y.variance)[k]) == doctest::Approx(0.1).epsilon(0.2));
+    CHECK(planeMean(combinedShares(y, y.mean, worse, {})[k]) == doctest::Approx(0.1).epsilon(0.2));
     // The best mean has a tenth of the other image, twice of what is in it.
-    CHECK(meanOf(combinedShares(y, y.mean, mixed, y.variance)[k]) > 0.9);
+    CHECK(planeMean(combinedShares(y, y.mean, mixed, y.variance)[k]) > 0.9);
   }
 }
 
@@ -116,7 +111,7 @@ TEST_CASE("A rare strong sample is shared out and not lost") {
   }
   const MethodResult with = run(c, 1), without = run(quiet, 1);
   for (size_t k = 0; k < 3; ++k) {
-    const double kept = (meanOf(with.image.mean[k]) - meanOf(without.image.mean[k])) * 64 * 64;
+    const double kept = (planeMean(with.image.mean[k]) - planeMean(without.image.mean[k])) * 64 * 64;
     CHECK(kept > 0.9 * static_cast<double>(excess));
     CHECK(kept < 1.1 * static_cast<double>(excess));
     CHECK(with.image.mean[k].at(32, 32) < 0.1f * excess);

@@ -15,7 +15,8 @@ const OptionInfo kVariance{"rdfc-variance", 0,
                            "Variance of the colour: 0 of the samples (paper, independent samples), 1 rescaled by the "
                            "halves (paper, low-discrepancy samples), 2 shrunk towards its neighbourhood"};
 
-const OptionInfo kDespike{"rdfc-despike", 1, "0: keep outliers that one half or two quarters alone speak for"};
+const OptionInfo kDespike{"rdfc-despike", 1,
+                          "1: take out outliers that one half or two quarters alone speak for; 0: the paper"};
 
 const char* const kCandidateNames[] = {"first", "second", "third"};
 
