@@ -30,19 +30,20 @@ Plane<float> squaredBiasSamples(const Estimate& photonMap);
 // variance and gamma², the square of its bias less the variance of that estimate, not below 0. Averaged over channels
 // and smoothed over 13 x 13 pixels along surfaces, for bias has structure; where a pixel's own bias is beyond three
 // deviations, gamma² is no less than it says. Variances beyond 64 times what is usual around them stay with their
-// pixels: an outlier would take a whole window from the photon map, and with it the caustic in it.
+// pixels: an outlier would take a whole window from the photon map, and with it the caustic in it. With an unbiased
+// image gamma² is no less than unknownSquaredBias().
 struct PhotonMapError {
   Plane<float> variance, squaredBias;
 };
-PhotonMapError photonMapError(const Estimate& photonMap, const Features* features);
+PhotonMapError photonMapError(const Estimate& photonMap, const Features* features, const Estimate* unbiased = nullptr);
 // Their sum, at least 10⁻⁸ (y² + 10⁻⁴).
 Plane<float> totalError(const Estimate& photonMap, const PhotonMapError& error);
 
-// E_b: that sum. Without an estimate of the bias, but with halves, the error
+// E_b: that sum, `measured`: with X as the unbiased image. Without an estimate of the bias, but with halves, the error
 // across halves (4.4), which holds any bias; else (Y - X)² less the variance, which is too small, for Y has seen the
 // samples of X. At least 10⁻⁸ (y² + 10⁻⁴).
 Plane<float> biasedError(const Estimate& biased, const Estimate& unbiased, const Rgb<float>& variance,
-                         const Features* features);
+                         const Features* features, bool measured = false);
 
 // eta²: the squared error of the prior, measured across halves as in error_map.h and averaged over 13 x 13 pixels
 // (ALGORITHMS 3.4). Residuals are first limited to 8 times the deviation of their surroundings: that of X, or the root

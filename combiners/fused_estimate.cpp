@@ -89,7 +89,7 @@ FusedEstimate fusedEstimate(const Estimate& unbiased, const std::vector<const Es
   std::vector<Plane<float>> errors = {unbiasedError(unbiased, variance)}, squaredBiases;
   for (const Estimate* b : biased) {
     inputs.push_back(b);
-    PhotonMapError error = photonMapError(*b, features);
+    PhotonMapError error = photonMapError(*b, features, &unbiased);
     errors.push_back(totalError(*b, error));
     squaredBiases.push_back(std::move(error.squaredBias));
     countMissingLight(errors[0], unbiased, variance, *b, errors.back());

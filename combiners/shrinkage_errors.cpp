@@ -9,6 +9,7 @@
 #include "combiners/finite_float.h"
 #include "combiners/joint_filter.h"
 #include "combiners/shrinkage.h"
+#include "combiners/unknown_bias.h"
 
 namespace braid {
 
@@ -98,7 +99,7 @@ Plane<float> squaredBiasSamples(const Estimate& photonMap) {
   });
 }
 
-PhotonMapError photonMapError(const Estimate& photonMap, const Features* features) {
+PhotonMapError photonMapError(const Estimate& photonMap, const Features* features, const Estimate* unbiased) {
   const Rgb<float> noise = meanVariance(photonMap);
   const Plane<float> spread = channelMean(noise, [&](size_t i, size_t c) { return at(noise, i, c); });
   const Plane<float> squaredBias = squaredBiasSamples(photonMap);
@@ -113,6 +114,9 @@ PhotonMapError photonMapError(const Estimate& photonMap, const Features* feature
     const bool significant = own + deviation > sqr(kSignificance) * deviation;
     error.squaredBias[i] = std::max({0.0f, error.squaredBias[i], significant ? finiteFloat(own) : 0.0f});
   }
+  if (!unbiased) return error;
+  const Plane<float> unknown = unknownSquaredBias(*unbiased, photonMap);
+  for (size_t i = 0; i < unknown.size(); ++i) error.squaredBias[i] = std::max(error.squaredBias[i], unknown[i]);
   return error;
 }
 
@@ -125,8 +129,8 @@ Plane<float> totalError(const Estimate& photonMap, const PhotonMapError& error) 
 }
 
 Plane<float> biasedError(const Estimate& biased, const Estimate& unbiased, const Rgb<float>& variance,
-                         const Features* features) {
-  if (!biased.bias.empty()) return totalError(biased, photonMapError(biased, features));
+                         const Features* features, bool measured) {
+  if (!biased.bias.empty()) return totalError(biased, photonMapError(biased, features, measured ? &unbiased : nullptr));
   const Plane<float> samples = hasHalves(biased) && hasHalves(unbiased)
                                    ? squaredErrorSamples(biased.half, unbiased, variance)
                                    : channelMean(variance, [&](size_t i, size_t c) {

@@ -174,14 +174,15 @@ TEST_CASE("Fused weights are inverse errors, and the bias that is left is counte
   Estimate x = flat(1.0f, 0.03f), s = flat(1.0f, 0.005f);
   s.name = "sppm";
   s.unbiased = false;
-  s.mean = s.half[0] = s.half[1] = Rgb<float>(40, 30, 0.9f);
+  const float bias = std::sqrt(0.005f);
+  s.mean = s.half[0] = s.half[1] = Rgb<float>(40, 30, 1 - bias);
   s.quarter.assign(4, s.mean);
-  s.bias = Rgb<float>(40, 30, std::sqrt(0.005f));
+  s.bias = Rgb<float>(40, 30, bias);
   s.biasVariance = Rgb<float>(40, 30);
   const FusedEstimate f = fusedEstimate(x, {&s}, nullptr);
   // Errors 0.03 and 0.01: weights 1/4 and 3/4.
-  CHECK(f.image.mean[0][500] == doctest::Approx(0.25 * 1.0 + 0.75 * 0.9).epsilon(1e-3));
-  CHECK(f.image.quarter[2][1][500] == doctest::Approx(0.925).epsilon(1e-3));
+  CHECK(f.image.mean[0][500] == doctest::Approx(0.25 * 1.0 + 0.75 * (1 - bias)).epsilon(1e-3));
+  CHECK(f.image.quarter[2][1][500] == doctest::Approx(1 - 0.75 * bias).epsilon(1e-3));
   CHECK(f.image.variance[0][500] == doctest::Approx(0.0625 * 0.03 + 0.5625 * 0.01).epsilon(1e-3));
   CHECK(f.squaredBias[500] == doctest::Approx(0.5625 * 0.005).epsilon(1e-3));
 }

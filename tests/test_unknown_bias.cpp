@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+// The bias of a photon map that it does not know of, as an unbiased image measures it, and what combiners make of it.
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <random>
+
+#include <doctest/doctest.h>
+
+#include "combiners/error_map.h"
+#include "combiners/fused_estimate.h"
+#include "combiners/registry.h"
+#include "combiners/unknown_bias.h"
+#include "tests/combiner_fixture.h"
+
+using namespace braid;
+using namespace braid::test;
+
+namespace {
+
+constexpr int kWidth = 120, kHeight = 90;
+
+// An image of the given values whose halves have normal noise of this standard deviation, so that the mean's is
+// 1/sqrt(2) of it, and its variance.
+Estimate noisy(const std::function<double(int, int)>& value, double deviation, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0, deviation);
+  Estimate e;
+  e.passes = 64;
+  e.mean = e.half[0] = e.half[1] = Rgb<float>(kWidth, kHeight);
+  e.variance = Rgb<float>(kWidth, kHeight, static_cast<float>(deviation * deviation / 2));
+  for (size_t c = 0; c < 3; ++c)
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x) {
+        for (Rgb<float>& half : e.half) half[c].at(x, y) = static_cast<float>(value(x, y) + normal(random));
+        e.mean[c].at(x, y) = 0.5f * (e.half[0][c].at(x, y) + e.half[1][c].at(x, y));
+      }
+  return e;
+}
+
+// A photon map that takes itself for unbiased.
+Estimate photonMap(const std::function<double(int, int)>& value, double deviation, unsigned seed) {
+  Estimate e = noisy(value, deviation, seed);
+  e.name = "sppm";
+  e.unbiased = false;
+  e.bias = e.biasVariance = Rgb<float>(kWidth, kHeight);
+  return e;
+}
+
+double one(int, int) { return 1; }
+
+// Every third column, as narrow leaves, has lost 0.3 of its light.
+double narrow(int x, int) { return x % 3 == 0 ? 0.7 : 1.0; }
+constexpr double kNarrowBias = 0.3 * 0.3 / 3;  // squared, on the average
+
+double mean(const Plane<float>& p) {
+  double sum = 0;
+  for (const float v : p.data) sum += static_cast<double>(v);
+  return sum / static_cast<double>(p.size());
+}
+
+double squaredError(const Rgb<float>& image, double truth) {
+  double sum = 0;
+  for (size_t c = 0; c < 3; ++c)
+    for (const float v : image[c].data) sum += sqr(static_cast<double>(v) - truth);
+  return sum / (3.0 * kWidth * kHeight);
+}
+
+}  // namespace
+
+TEST_CASE("The light that narrow things lose is measured by the halves of both images") {
+  for (const double deviation : {0.02, 0.2, 0.5}) {
+    const Plane<float> bias = unknownSquaredBias(noisy(one, deviation, 1), photonMap(narrow, 0.5 * deviation, 2));
+    // Of 169 products of deviations sqrt(1.25) d, three channels each, the mean has this standard error; the image
+    // holds 64 windows of them: 4 deviations, one false alarm in 16,000 seeds. What is not significant counts as 0.
+    const double window = 1.25 * deviation * deviation / std::sqrt(3 * 169.0);
+    CAPTURE(deviation);
+    CHECK(mean(bias) == doctest::Approx(kNarrowBias).epsilon(0.05 + 4 * window / 8 / kNarrowBias));
+  }
+}
+
+TEST_CASE("Where neither image is biased hardly anything is found, and never more than a little of the noise") {
+  const double deviation = 0.3;
+  const Plane<float> bias = unknownSquaredBias(noisy(one, deviation, 3), photonMap(one, deviation, 4));
+  size_t found = 0;
+  double largest = 0;
+  for (const float b : bias.data) {
+    found += b > 0;
+    largest = std::max(largest, static_cast<double>(b));
+  }
+  // Two deviations are exceeded on one side by 2.3 % of independent windows; the image has 64 of them.
+  CHECK(static_cast<double>(found) < 0.12 * static_cast<double>(bias.size()));
+  CHECK(largest < 0.5 * deviation * deviation);
+}
+
+TEST_CASE("A photon map that is brighter tells of light that the unbiased image has not found") {
+  const auto dark = [](int x, int) { return x % 3 == 0 ? 0.4 : 1.0; };
+  const Plane<float> bias = unknownSquaredBias(noisy(dark, 0.01, 5), photonMap(one, 0.01, 6));
+  for (const float b : bias.data) CHECK(b == 0);
+}
+
+TEST_CASE("Outliers of either image are no bias, and hide none") {
+  Estimate x = noisy(one, 0.05, 7), s = photonMap(one, 0.05, 8), leaves = photonMap(narrow, 0.05, 8);
+  for (Estimate* e : {&x, &s, &leaves})
+    for (size_t c = 0; c < 3; ++c) {
+      const size_t i = x.mean[0].index(e == &x ? 30 : 90, 45);
+      e->half[0][c][i] = 2001;
+      e->mean[c][i] = 1001;
+    }
+  const Plane<float> none = unknownSquaredBias(x, s), bias = unknownSquaredBias(x, leaves);
+  for (const int column : {30, 90})
+    for (int dx = -6; dx <= 6; ++dx) {
+      CHECK(none.at(column + dx, 45) < 0.05 * 0.05);
+      CHECK(bias.at(column + dx, 45) > 0.7 * kNarrowBias);
+    }
+}
+
+TEST_CASE("Equal images, missing halves and extreme values") {
+  const Estimate x = noisy(one, 0.1, 9);
+  for (const float b : unknownSquaredBias(x, x).data) CHECK(std::isfinite(b));
+  Estimate same = noisy(one, 0, 9);
+  for (const float b : unknownSquaredBias(same, same).data) CHECK(b == 0);
+  Estimate none = x;
+  none.half[1] = Rgb<float>();
+  CHECK(unknownSquaredBias(x, none).empty());
+  CHECK(unknownSquaredBias(none, x).empty());
+  Estimate huge = x;
+  for (Rgb<float>* image : {&huge.mean, &huge.half[0], &huge.half[1]})
+    for (Plane<float>& plane : image->channel)
+      for (float& v : plane.data) v *= 1e30f;
+  for (const float b : unknownSquaredBias(huge, x).data) CHECK(std::isfinite(b));
+}
+
+TEST_CASE("A photon map that has lost light in narrow things, unknowingly, does not spoil the fused image") {
+  for (const double deviation : {0.05, 0.2}) {
+    const Estimate x = noisy(one, deviation, 10), s = photonMap(narrow, 0.1 * deviation, 11);
+    const double fused = squaredError(fusedEstimate(x, {&s}, nullptr).image.mean, 1);
+    const double best = std::min(squaredError(x.mean, 1), squaredError(s.mean, 1));
+    CAPTURE(deviation);
+    CHECK(fused < 1.02 * best);  // by its own word alone 24 times as much at 0.05
+  }
+}
+
+TEST_CASE("double-shrinkage: what a photon map does not know of its bias, and its outliers") {
+  Estimate x = noisy(one, 0.05, 12), s = photonMap(narrow, 0.005, 13);
+  const auto errorWith = [&](const char* option, double value) {
+    MethodInputs in;
+    in.unbiased = &x;
+    in.biased = &s;
+    in.options.set(std::string("double-shrinkage-") + option, value);
+    return squaredError(make_double_shrinkage()->run(in).image.mean, 1);
+  };
+  CHECK(errorWith("measured", 1) < 1.1 * squaredError(x.mean, 1));
+  CHECK(errorWith("measured", 0) > 3 * errorWith("measured", 1));
+  // One photon in one quarter.
+  s = photonMap(one, 0.02, 14);
+  const size_t outlier = s.mean[0].index(60, 45);
+  for (size_t c = 0; c < 3; ++c) {
+    s.half[0][c][outlier] = 401;
+    s.mean[c][outlier] = 201;
+    s.variance[c][outlier] = 200 * 200;
+  }
+  CHECK(errorWith("despike", 1) < squaredError(x.mean, 1));
+  CHECK(errorWith("despike", 0) > 2 * errorWith("despike", 1));
+}
