@@ -14,6 +14,10 @@ namespace braid {
 
 namespace {
 
+constexpr double kContradiction = 3;  // deviations from Y at which a pixel contradicts it
+constexpr int kAround = 2;            // radius of the window that tells how far off Y is
+constexpr double kShare = 0.5;  // of `least`: the most that another such pixel says, which may be an outlier as well
+
 constexpr double kLeastSum = 1e-5;        // released code
 constexpr double kRelativeLeast = 1e-12;  // of a squared difference, relative to x²: below it is rounding
 
@@ -216,16 +220,30 @@ Plane<float> outlierGate(const Rgb<float>& variance, int radius) {
   const Plane<float> around = mirrorBoxMean<float>(roots, radius);
   forAll(roots.size(), [&](size_t i) {
     const auto own = static_cast<double>(deviation[i]);
-    deviation[i] = own > 5 * sqr(static_cast<double>(around[i])) ? finiteFloat(sqr(3 * own)) : 0.0f;
+    deviation[i] = own > 5 * sqr(static_cast<double>(around[i])) ? finiteFloat(sqr(kContradiction * own)) : 0.0f;
   });
   return deviation;
 }
 
 bool isLoneOutlier(const Plane<float>& gate, const Rgb<float>& x, const Rgb<float>& y, size_t i) {
   if (gate.empty() || gate[i] <= 0) return false;
-  double square = 0;
-  for (size_t c = 0; c < 3; ++c) square += sqr(static_cast<double>(x[c][i]) - static_cast<double>(y[c][i])) / 3;
-  return square < static_cast<double>(gate[i]);
+  const auto squareAt = [&](size_t k) {
+    double square = 0;
+    for (size_t c = 0; c < 3; ++c) square += sqr(static_cast<double>(x[c][k]) - static_cast<double>(y[c][k])) / 3;
+    return square;
+  };
+  const auto least = static_cast<double>(gate[i]);
+  if (squareAt(i) >= least) return false;
+  const auto width = static_cast<size_t>(gate.width);
+  const int column = static_cast<int>(i % width), row = static_cast<int>(i / width);
+  double sum = 0, pixels = 0;
+  for (int v = std::max(0, row - kAround); v <= std::min(gate.height - 1, row + kAround); ++v)
+    for (int u = std::max(0, column - kAround); u <= std::min(gate.width - 1, column + kAround); ++u)
+      if (const size_t k = gate.index(u, v); k != i) {
+        sum += gate[k] > 0 ? std::min(squareAt(k), kShare * least) : squareAt(k);
+        ++pixels;
+      }
+  return sum <= pixels * least / sqr(kContradiction);
 }
 
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rgb<float>& y,

@@ -62,7 +62,10 @@ constexpr int kGateRadius = 7;
 // another image that such a pixel contradicts; 0 elsewhere. Compared with windows of (2 radius + 1)² pixels.
 Plane<float> outlierGate(const Rgb<float>& variance, int radius);
 
-// Whether pixel i is a lone outlier of x that does not contradict y; `gate` is that of the noise of x, or empty.
+// Whether pixel i is a lone outlier of x that does not contradict y and that y is the better for: the mean
+// squared difference of its 5x5 neighbours, which is that of y, is not above the variance of pixel i. Neighbours that
+// may be outliers themselves say half of what contradicts y at most. A glossy reflection's pixels stand out by their
+// variances, too, and y may be far off in all of them. `gate` is that of the noise of x, or empty.
 bool isLoneOutlier(const Plane<float>& gate, const Rgb<float>& x, const Rgb<float>& y, size_t i);
 
 struct ShrunkImage {

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which pixels count as lone outliers: those that one sample carries, not those of a glossy reflection.
+#include <cmath>
+#include <random>
+
+#include <doctest/doctest.h>
+
+#include "combiners/box_mean.h"
+#include "combiners/registry.h"
+#include "combiners/shrinkage.h"
+
+using namespace braid;
+
+namespace {
+
+constexpr int kWidth = 96, kHeight = 72;
+
+Rgb<float> boxed(const Rgb<float>& in) {
+  Rgb<float> out(in.width(), in.height());
+  for (size_t c = 0; c < 3; ++c) out[c] = boxMean<float>(in[c], 7);
+  return out;
+}
+
+// Lamps mirrored by a glossy plate every 24 pixels: spots of two pixels in radius on black.
+double reflection(int x, int y) {
+  const double dx = x % 24 - 12, dy = y % 24 - 12;
+  return 0.02 + 2 * std::exp(-(dx * dx + dy * dy) / (2 * 2.0 * 2.0));
+}
+
+// It with noise in proportion to its brightness.
+Estimate noisyReflection(double relativeDeviation, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  Estimate e;
+  e.passes = 512;
+  e.mean = e.half[0] = e.half[1] = e.variance = Rgb<float>(kWidth, kHeight);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) {
+      const double value = reflection(x, y), deviation = relativeDeviation * value;
+      const double noise[2] = {normal(random), normal(random)};
+      for (size_t c = 0; c < 3; ++c) {
+        for (size_t h = 0; h < 2; ++h)
+          e.half[h][c].at(x, y) = static_cast<float>(value + std::sqrt(2.0) * deviation * noise[h]);
+        e.mean[c].at(x, y) = 0.5f * (e.half[0][c].at(x, y) + e.half[1][c].at(x, y));
+        e.variance[c].at(x, y) = static_cast<float>(deviation * deviation);
+      }
+    }
+  return e;
+}
+
+double squaredError(const Rgb<float>& image) {
+  double sum = 0;
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) {
+      const double d = static_cast<double>(image[0].at(x, y)) - reflection(x, y);
+      sum += d * d;
+    }
+  return sum;
+}
+
+}  // namespace
+
+TEST_CASE("A pixel that one sample carries is a lone outlier where the other image is right around it") {
+  Rgb<float> x(kWidth, kHeight, 1.0f), variance(kWidth, kHeight, 1e-4f), y(kWidth, kHeight, 1.01f);
+  const size_t outlier = x[0].index(40, 30), edge = x[0].index(0, 0);
+  for (const size_t i : {outlier, edge})
+    for (size_t c = 0; c < 3; ++c) {
+      x[c][i] = 3;
+      variance[c][i] = 4;
+    }
+  const Plane<float> gate = outlierGate(variance, kGateRadius);
+  for (size_t i = 0; i < gate.size(); ++i) CHECK(isLoneOutlier(gate, x, y, i) == (i == outlier || i == edge));
+  // Of pixels around it that are off by as much as the outlier nothing can be learnt.
+  const Rgb<float> wrong(kWidth, kHeight, 3.5f);
+  CHECK_FALSE(isLoneOutlier(gate, x, wrong, outlier));
+  CHECK_FALSE(isLoneOutlier(Plane<float>(), x, y, outlier));
+}
+
+TEST_CASE("Outliers side by side do not speak for each other") {
+  Rgb<float> x(kWidth, kHeight, 1.0f), variance(kWidth, kHeight, 1e-4f);
+  const Rgb<float> y(kWidth, kHeight, 1.0f);
+  const size_t first = x[0].index(40, 30);
+  for (const size_t i : {first, first + 1, first + 2 * kWidth})
+    for (size_t c = 0; c < 3; ++c) {
+      x[c][i] = 21;
+      variance[c][i] = 200;
+    }
+  const Plane<float> gate = outlierGate(variance, kGateRadius);
+  for (const size_t i : {first, first + 1, first + 2 * kWidth}) CHECK(isLoneOutlier(gate, x, y, i));
+}
+
+TEST_CASE("A glossy reflection is not replaced by what a filter has made of it") {
+  // Its pixels deviate by 16 to 40 %, far more than the black around them, and by less than three deviations from
+  // the filter: shrinkage towards a box must not be worse than what it shrinks.
+  for (const double deviation : {0.16, 0.25, 0.4}) {
+    Estimate x = noisyReflection(deviation, 1), box;
+    box.name = "box";
+    box.unbiased = false;
+    box.passes = x.passes;
+    box.mean = boxed(x.mean);
+    for (size_t h = 0; h < 2; ++h) box.half[h] = boxed(x.half[h]);
+    MethodInputs in;
+    in.unbiased = &x;
+    in.biased = &box;
+    CAPTURE(deviation);
+    CHECK(squaredError(make_js()->run(in).image.mean) < 1.02 * squaredError(x.mean));
+  }
+}
