@@ -338,6 +338,9 @@ TEST_CASE("auto fuses what an auto plan rendered, offline as in process") {
   CHECK(a.planes.count("Error.Y") == 1);
   combined(folder, "--unbiased a.exr --method auto -o b.exr");
   CHECK(identical(a.rgb("combined.auto"), readImage(folder.path / "b.exr").rgb("combined.auto")));
+  // Named a second time the photon map still counts once.
+  combined(folder, "--unbiased a.exr --biased a.exr:sppm --method auto -o c.exr");
+  CHECK(identical(a.rgb("combined.auto"), readImage(folder.path / "c.exr").rgb("combined.auto")));
 }
 
 TEST_CASE("bench tells what denoisers and combiners cost, inputs first") {

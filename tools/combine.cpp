@@ -42,15 +42,23 @@ void checkSize(const std::string& file, int width, int height, const Estimates& 
                                                 height, all.width, all.height));
 }
 
-// Adds the first estimate of `from` that fits, or else the very first, under a name that is free. Returns the name.
+bool samePixels(const Rgb<float>& a, const Rgb<float>& b) {
+  for (size_t c = 0; c < 3; ++c)
+    if (!std::equal(a[c].data.begin(), a[c].data.end(), b[c].data.begin(), b[c].data.end())) return false;
+  return true;
+}
+
+// Adds the first estimate of `from` that fits, or else the very first, under a name that is free, unless the same one
+// has been read already: two copies of an image would count as independent.
 template <class Fits>
-std::string addEstimate(Estimates& all, Estimates from, const std::string& file, const Fits& fits) {
+Estimate& addEstimate(Estimates& all, Estimates from, const std::string& file, const Fits& fits) {
   checkSize(file, from.width, from.height, all);
   auto found = std::find_if(from.estimates.begin(), from.estimates.end(), fits);
   if (found == from.estimates.end() || file.find(':') != std::string::npos) found = from.estimates.begin();
+  for (Estimate& e : all.estimates)
+    if (fits(e) && e.name == found->name && samePixels(e.mean, found->mean)) return e;
   while (all.find(found->name) || isMethod(found->name)) found->name += "-file";
-  all.estimates.push_back(std::move(*found));
-  return all.estimates.back().name;
+  return all.estimates.emplace_back(std::move(*found));
 }
 
 // A braid file as the biased input stands for its headline where it has no biased estimate: a combined image.
@@ -87,10 +95,9 @@ Estimates readInputs(const CombineOptions& o, PipelineOptions& pipeline, std::ve
   pipeline.roles.unbiased = independent->name;
   if (!o.correlated.empty()) {
     read.foreignName = "correlated";
-    pipeline.roles.correlated =
-        addEstimate(all, readEstimatesOption(o.correlated, read), o.correlated,
-                    [](const Estimate& e) { return e.correlation != Correlation::Independent; });
-    Estimate& e = all.estimates.back();
+    Estimate& e = addEstimate(all, readEstimatesOption(o.correlated, read), o.correlated,
+                              [](const Estimate& other) { return other.correlation != Correlation::Independent; });
+    pipeline.roles.correlated = e.name;
     if (e.correlation == Correlation::Independent) e.correlation = Correlation::CommonRandomNumbers;
   }
   const std::string& biased = o.choice.biased;
@@ -98,9 +105,10 @@ Estimates readInputs(const CombineOptions& o, PipelineOptions& pipeline, std::ve
       biased.rfind("external:", 0) != 0) {
     read.foreignName = "biased";
     read.role = ImageRole::Denoised;
-    pipeline.roles.biased =
-        addEstimate(all, readBiased(biased, read), biased, [](const Estimate& e) { return !e.unbiased; });
-    all.estimates.back().unbiased = false;
+    Estimate& e =
+        addEstimate(all, readBiased(biased, read), biased, [](const Estimate& other) { return !other.unbiased; });
+    pipeline.roles.biased = e.name;
+    e.unbiased = false;
   }
   if (!o.reference.empty()) all.reference = readReferenceImage(o.reference, all);
   for (std::string& base : pipeline.roles.bases)
