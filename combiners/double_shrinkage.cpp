@@ -253,7 +253,7 @@ MethodResult DoubleShrinkageMethod::run(const MethodInputs& given) const {
   result.aovs.push_back({"error-unbiased.double-shrinkage", std::move(errorU)});
   result.aovs.push_back({"error-biased.double-shrinkage", std::move(errorB)});
   result.error =
-      halves ? errorMap(out.half, *given.unbiased, meanVariance(*given.unbiased), y.mean) : std::move(maps.variance);
+      halves ? errorMap(out.half, *given.unbiased, meanVariance(*given.unbiased), out.mean) : std::move(maps.variance);
   return result;
 }
 

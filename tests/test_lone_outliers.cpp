@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which pixels count as lone outliers: those that one sample carries, not those of a glossy reflection.
+// Which pixels count as lone outliers: those that one sample carries, not those of a glossy reflection; and what
+// shrinkage towards a filter makes of such a reflection.
 #include <cmath>
 #include <random>
 
@@ -48,14 +49,37 @@ Estimate noisyReflection(double relativeDeviation, unsigned seed) {
   return e;
 }
 
-double squaredError(const Rgb<float>& image) {
-  double sum = 0;
+// Sums of squared errors and of relative ones.
+struct Errors {
+  double square = 0, relative = 0;
+};
+
+Errors errorsOf(const Rgb<float>& image) {
+  Errors sum;
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) {
-      const double d = static_cast<double>(image[0].at(x, y)) - reflection(x, y);
-      sum += d * d;
+      const double truth = reflection(x, y), d = static_cast<double>(image[0].at(x, y)) - truth;
+      sum.square += d * d;
+      sum.relative += d * d / (truth * truth + 0.01);
     }
   return sum;
+}
+
+Estimate boxOf(const Estimate& x) {
+  Estimate box;
+  box.name = "box";
+  box.unbiased = false;
+  box.passes = x.passes;
+  box.mean = boxed(x.mean);
+  for (size_t h = 0; h < 2; ++h) box.half[h] = boxed(x.half[h]);
+  return box;
+}
+
+MethodResult shrunkTowards(const Estimate& y, const Estimate& x) {
+  MethodInputs in;
+  in.unbiased = &x;
+  in.biased = &y;
+  return make_js()->run(in);
 }
 
 }  // namespace
@@ -93,16 +117,19 @@ TEST_CASE("A glossy reflection is not replaced by what a filter has made of it")
   // Its pixels deviate by 16 to 40 %, far more than the black around them, and by less than three deviations from
   // the filter: shrinkage towards a box must not be worse than what it shrinks.
   for (const double deviation : {0.16, 0.25, 0.4}) {
-    Estimate x = noisyReflection(deviation, 1), box;
-    box.name = "box";
-    box.unbiased = false;
-    box.passes = x.passes;
-    box.mean = boxed(x.mean);
-    for (size_t h = 0; h < 2; ++h) box.half[h] = boxed(x.half[h]);
-    MethodInputs in;
-    in.unbiased = &x;
-    in.biased = &box;
+    const Estimate x = noisyReflection(deviation, 1);
     CAPTURE(deviation);
-    CHECK(squaredError(make_js()->run(in).image.mean) < 1.02 * squaredError(x.mean));
+    CHECK(errorsOf(shrunkTowards(boxOf(x), x).image.mean).square < 1.02 * errorsOf(x.mean).square);
   }
+}
+
+TEST_CASE("What is told of the error beside a bright reflection is in proportion to the image, not to the filter's") {
+  const Estimate x = noisyReflection(0.2, 2);
+  const MethodResult result = shrunkTowards(boxOf(x), x);
+  double told = 0;
+  for (size_t i = 0; i < result.error.size(); ++i)
+    told += static_cast<double>(result.error[i]) / (sqr(static_cast<double>(result.image.mean[0][i])) + 0.01);
+  const double truth = errorsOf(result.image.mean).relative;
+  CHECK(told > 0.5 * truth);
+  CHECK(told < 2 * truth);
 }
