@@ -13,8 +13,8 @@
 //     samples than the biased image itself (js-regression 2; relative_weights.h): towards pw 0 cases and a gain of 6.3
 //     instead of 3 and 5.6, rdfc 2 (1.07x) and 7.2 instead of 4 (1.3x) and 6.3, box 6 and 5.8 as before.
 //   - The factor is never below the one that the halves measure (js-measured; measured_factors.h): on glossy
-//     plates, towards box, 0.92 of the unbiased image's error at 32 samples instead of 1.90, 1.06 at 128 instead
-//     of 1.93.
+//     plates, towards box, 0.84 of the unbiased image's error at 32 samples instead of 3.7, 0.91 at 128 instead
+//     of 2.2.
 // A constant of 1.25 is a little worse in all of these than the paper's 1.
 //
 // Halves of the result. With js-regression the half h is JS(X^h, its variance, own fit of half h): the halves share the

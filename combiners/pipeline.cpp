@@ -71,6 +71,7 @@ class Runner {
 
  private:
   const Estimate* estimate(const std::string& name) const;
+  GivenQuarters givenQuarters(const std::string& name) const;
   MethodInputs inputsOf(const Step& step) const;
   std::string missingInput(const Step& step) const;
   double inputSeconds(const Step& step) const;
@@ -122,6 +123,12 @@ const Estimate* Runner::estimate(const std::string& name) const {
   return all_.find(name);
 }
 
+GivenQuarters Runner::givenQuarters(const std::string& name) const {
+  const Estimate* given = given_->find(name);
+  if (!given || given->quarter.size() != 4) return {};
+  return {&given->quarter, result.exposure};
+}
+
 // What a method made may lack halves that the recipe could not know of, or may have failed.
 std::string Runner::missingInput(const Step& step) const {
   std::vector<std::string> names = step.bases;
@@ -145,8 +152,8 @@ MethodInputs Runner::inputsOf(const Step& step) const {
   for (const std::string& base : step.bases) in.bases.push_back(estimate(base));
   in.features = features_;
   if (!all_.reference.empty()) in.reference = &all_.reference;
-  const Estimate* given = step.kept == 0 ? given_->find(step.unbiased) : nullptr;
-  if (given && given->quarter.size() == 4) in.quarters = {&given->quarter, result.exposure};
+  if (step.kept == 0) in.quarters = givenQuarters(step.unbiased);
+  if (!result.find(step.biased)) in.biasedQuarters = givenQuarters(step.biased);
   const auto history = all_.history.find(step.unbiased);
   in.history = history == all_.history.end() ? nullptr : &history->second;
   in.seed = all_.seed;

@@ -31,6 +31,7 @@ MemoryCase caseOf(const Step& step, const Facts& facts) {
   c.bases = static_cast<int>(step.bases.size());
   for (const std::string& base : step.bases)
     if (const EstimateFacts* e = facts.find(base); e && e->bias) ++c.photonMaps;
+  if (const EstimateFacts* e = facts.find(step.biased)) c.photonMap = e->bias;
   return c;
 }
 

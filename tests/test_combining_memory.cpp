@@ -26,11 +26,11 @@ Case caseOf(uint64_t samples) {
   return makeCase(options);
 }
 
-MethodInputs inputsOf(const Case& c, const std::vector<const char*>& bases) {
+MethodInputs inputsOf(const Case& c, const std::vector<const char*>& bases, const char* biased) {
   MethodInputs in;
   in.unbiased = &c.pt();
   in.correlated = &c.crn();
-  in.biased = &c.find("narrow");
+  in.biased = &c.find(biased);
   in.features = &*c.estimates.features;
   in.reference = &c.truth;
   in.history = &c.estimates.history.at("pt");
@@ -39,15 +39,18 @@ MethodInputs inputsOf(const Case& c, const std::vector<const char*>& bases) {
   return in;
 }
 
-void checkMemory(const Method& method, const Case& c, const std::vector<const char*>& bases) {
-  const MethodInputs in = inputsOf(c, bases);
+void checkMemory(const Method& method, const Case& c, const std::vector<const char*>& bases,
+                 const char* biased = "narrow") {
+  const MethodInputs in = inputsOf(c, bases, biased);
   MemoryCase of{c.pt().passes, static_cast<int>(bases.size()), 0};
   for (const Estimate* base : in.bases) of.photonMaps += base->bias.empty() ? 0 : 1;
+  of.photonMap = !in.biased->bias.empty();
   const MethodMemory stated = method.memory(of);
   const int64_t before = heapBytes();
   resetHeapPeak();
   const MethodResult result = method.run(in);
-  INFO(std::string(method.name()), " with ", bases.size(), " bases after ", of.passes, " passes");
+  INFO(std::string(method.name()), " of ", std::string(biased), " with ", bases.size(), " bases after ", of.passes,
+       " passes");
   // On a busy machine one thread may have done all the work before another has begun.
   const double thread = perPixel(static_cast<int64_t>(stated.eachThread)), peak = perPixel(heapPeak() - before);
   CHECK(peak < 1.1 * (stated.peak + kThreads * thread));
@@ -72,6 +75,7 @@ TEST_CASE("every method states its memory to 10 %") {
         for (const auto& bases : baseSets)
           if (static_cast<int>(bases.size()) >= needs.bases && (needs.anyBases || needs.bases > 0 || bases.empty()))
             checkMemory(*method, c, bases);
+        if (needs.biased && !needs.redenoise && needs.bases == 0) checkMemory(*method, c, {}, "sppm");
       }
     });
   }

@@ -6,21 +6,15 @@
 
 #include <doctest/doctest.h>
 
-#include "combiners/box_mean.h"
 #include "combiners/registry.h"
 #include "combiners/shrinkage.h"
+#include "tests/combiner_fixture.h"
 
 using namespace braid;
 
 namespace {
 
 constexpr int kWidth = 96, kHeight = 72;
-
-Rgb<float> boxed(const Rgb<float>& in) {
-  Rgb<float> out(in.width(), in.height());
-  for (size_t c = 0; c < 3; ++c) out[c] = boxMean<float>(in[c], 7);
-  return out;
-}
 
 // Lamps mirrored by a glossy plate every 24 pixels: spots of two pixels in radius on black.
 double reflection(int x, int y) {
@@ -70,8 +64,8 @@ Estimate boxOf(const Estimate& x) {
   box.name = "box";
   box.unbiased = false;
   box.passes = x.passes;
-  box.mean = boxed(x.mean);
-  for (size_t h = 0; h < 2; ++h) box.half[h] = boxed(x.half[h]);
+  box.mean = test::detail::boxFilter(x.mean, 7);
+  for (size_t h = 0; h < 2; ++h) box.half[h] = test::detail::boxFilter(x.half[h], 7);
   return box;
 }
 
@@ -94,7 +88,7 @@ TEST_CASE("A pixel that one sample carries is a lone outlier where the other ima
     }
   const Plane<float> gate = outlierGate(variance, kGateRadius);
   for (size_t i = 0; i < gate.size(); ++i) CHECK(isLoneOutlier(gate, x, y, i) == (i == outlier || i == edge));
-  // Of pixels around it that are off by as much as the outlier nothing can be learnt.
+  // An image that is off by more than the outlier deviates is no better.
   const Rgb<float> wrong(kWidth, kHeight, 3.5f);
   CHECK_FALSE(isLoneOutlier(gate, x, wrong, outlier));
   CHECK_FALSE(isLoneOutlier(Plane<float>(), x, y, outlier));

@@ -9,6 +9,8 @@
 
 #include "combiners/error_map.h"
 #include "combiners/fused_estimate.h"
+#include "combiners/pipeline.h"
+#include "combiners/plane_mean.h"
 #include "combiners/registry.h"
 #include "combiners/unknown_bias.h"
 #include "tests/combiner_fixture.h"
@@ -53,12 +55,6 @@ double one(int, int) { return 1; }
 double narrow(int x, int) { return x % 3 == 0 ? 0.7 : 1.0; }
 constexpr double kNarrowBias = 0.3 * 0.3 / 3;  // squared, on the average
 
-double mean(const Plane<float>& p) {
-  double sum = 0;
-  for (const float v : p.data) sum += static_cast<double>(v);
-  return sum / static_cast<double>(p.size());
-}
-
 double squaredError(const Rgb<float>& image, double truth) {
   double sum = 0;
   for (size_t c = 0; c < 3; ++c)
@@ -75,7 +71,7 @@ TEST_CASE("The light that narrow things lose is measured by the halves of both i
     // holds 64 windows of them: 4 deviations, one false alarm in 16,000 seeds. What is not significant counts as 0.
     const double window = 1.25 * deviation * deviation / std::sqrt(3 * 169.0);
     CAPTURE(deviation);
-    CHECK(mean(bias) == doctest::Approx(kNarrowBias).epsilon(0.05 + 4 * window / 8 / kNarrowBias));
+    CHECK(planeMean(bias) == doctest::Approx(kNarrowBias).epsilon(0.05 + 4 * window / 8 / kNarrowBias));
   }
 }
 
@@ -162,4 +158,29 @@ TEST_CASE("double-shrinkage: what a photon map does not know of its bias, and it
   }
   CHECK(errorWith("despike", 1) < squaredError(x.mean, 1));
   CHECK(errorWith("despike", 0) > 2 * errorWith("despike", 1));
+}
+
+TEST_CASE("double-shrinkage of a photon map with outliers does not depend on what else is asked for") {
+  CaseOptions o;
+  o.samples = 16;
+  Case c = makeCase(o);
+  Estimate& s = c.estimates.estimates[2];
+  REQUIRE(s.quarter.size() == 4);
+  // An outlier that one quarter holds, and one that two quarters of both halves hold: quarters alone tell of that.
+  for (const auto& [x, quarters] : {std::pair(20, std::array{400.0f, 0.0f, 0.0f, 0.0f}), {40, {400.0f, 400.0f, 0, 0}}})
+    for (size_t k = 0; k < 3; ++k) {
+      for (size_t q = 0; q < 4; ++q) s.quarter[q][k].at(x, 20) += quarters[q];
+      for (size_t h = 0; h < 2; ++h) s.half[h][k].at(x, 20) += 0.5f * (quarters[h] + quarters[h + 2]);
+      s.mean[k].at(x, 20) = 0.5f * (s.half[0][k].at(x, 20) + s.half[1][k].at(x, 20));
+      s.variance[k].at(x, 20) = 1e4f;
+    }
+  const auto image = [&](const std::vector<std::string>& wanted) {
+    const PipelineResult r = runPipeline(c.estimates, wanted, {});
+    REQUIRE(r.find("double-shrinkage@sppm"));
+    return r.find("double-shrinkage@sppm")->result.image.mean;
+  };
+  const Rgb<float> alone = image({"double-shrinkage@sppm"});
+  CHECK(identical(alone, image({"auto", "double-shrinkage@sppm"})));
+  for (Estimate& e : c.estimates.estimates) e.quarter.clear();
+  CHECK_FALSE(identical(alone, image({"double-shrinkage@sppm"})));
 }

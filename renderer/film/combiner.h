@@ -69,6 +69,7 @@ struct MethodInputs {
   Estimate* expendable = nullptr;      // the same, if nobody reads it afterwards: a method may change it
   GivenQuarters quarters;              // of the unbiased estimate
   const Estimate* biased = nullptr;    // mean, halves; variance and bias where known
+  GivenQuarters biasedQuarters;        // of the biased estimate, unless a method made it
   std::vector<const Estimate*> bases;
   const Estimate* correlated = nullptr;
   const Features* features = nullptr;
@@ -100,9 +101,10 @@ struct MethodResult {
 
 // What the memory of a method depends on.
 struct MemoryCase {
-  uint64_t passes = 0;  // of the unbiased estimate; 0: not known
-  int bases = 0;        // images to choose from,
-  int photonMaps = 0;   // of which so many are biased estimates
+  uint64_t passes = 0;     // of the unbiased estimate; 0: not known
+  int bases = 0;           // images to choose from,
+  int photonMaps = 0;      // of which so many are biased estimates
+  bool photonMap = false;  // whether the biased input is one
 };
 
 // Bytes a pixel. The inputs are not counted.
