@@ -75,13 +75,15 @@ class PlainFilter {
       }
     const double rest = std::max(0.0, 1 - s / count / t2_);
     double exponent = (sqr(x - u) + sqr(y - v)) / 50.0;
-    if (const Features* f = input_.features)
+    if (const Features* f = input_.features) {
+      if ((f->depth.mean.at(x, y) == 0) != (f->depth.mean.at(u, v) == 0)) return 0;
       for (size_t c = 0; c < 3; ++c) {
         const auto clamped = [](float a) { return std::clamp(static_cast<double>(a), 0.0, 1.0); };
         exponent += sqr(clamped(f->albedo.mean[c].at(x, y)) - clamped(f->albedo.mean[c].at(u, v))) * 8;
         exponent +=
             sqr(static_cast<double>(f->normal.mean[c].at(x, y)) - static_cast<double>(f->normal.mean[c].at(u, v))) * 8;
       }
+    }
     return rest * rest * std::exp(-exponent);
   }
 
@@ -343,6 +345,33 @@ TEST_CASE("Emitters and misses keep their radiance undivided, black albedo is fl
   CHECK(divisor(1) == Vec3(1));
   CHECK(divisor(2) == Vec3(0.03f, 0.2f, 1));
   CHECK(divisor(3) == Vec3(0.03f, 0.2f, 0.3f));
+}
+
+TEST_CASE("Pixels where every ray has missed the scene and those at its edge are not mixed") {
+  // A black background below an edge that covers a tenth of its pixels, as noisy as light that is rarely met.
+  constexpr int kEdge = 12;
+  Case c = caseOf(40, 24, 8);
+  Features& f = *c.estimates.features;
+  Estimate e = plainEstimate(Rgb<float>(40, 24, 0.0f), 0);
+  for (int y = 0; y < 24; ++y)
+    for (int x = 0; x < 40; ++x) {
+      const size_t i = e.mean[0].index(x, y);
+      const bool miss = y > kEdge;
+      f.depth.mean.data[i] = miss ? 0.0f : 0.3f;
+      f.albedo.mean.set(i, Vec3(miss ? 0.0f : 0.07f));
+      f.normal.mean.set(i, Vec3(0, 0, -1));
+      if (miss) continue;
+      e.mean.set(i, Vec3(x % 4 == 0 ? 0.04f : 0.0f));
+      for (size_t k = 0; k < 3; ++k) e.variance[k].data[i] = 0.0003f;
+    }
+  const Rgb<float> image = filtered(e, &f, kPatchWelchWideThreshold)[0];
+  double background = 0, edge = 0;
+  for (int x = 10; x < 30; ++x) {
+    background = std::max(background, static_cast<double>(image[0].at(x, kEdge + 1)));
+    edge += static_cast<double>(image[0].at(x, kEdge)) / 20;
+  }
+  CHECK(background < 1e-30);
+  CHECK(edge == doctest::Approx(0.01).epsilon(0.1));
 }
 
 TEST_CASE("The halves average to the full output within the noise") {

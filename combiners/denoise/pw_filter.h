@@ -7,9 +7,10 @@
 // regularised variance. For the pixels p and q = p + d around it:
 //   z²(p) = mean over RGB of (u_p - u_q)² / (V_p + V_q),      s = mean of z² over 3 x 3 pairs at the same d,
 //   w     = max(0, 1 - s / t²)² exp(-|d|² / 50 - edge terms of albedo and normal),
-// clipped at the borders. Where both means have one expectation, E[s] is 1. t is the threshold z as a quantile of
-// Student's distribution with 2n - 2 degrees of freedom. V falls as 1/n, hence a neighbour that differs at all is left
-// out in the end: the filter is consistent.
+// clipped at the borders, and 0 between pixels where every ray has missed the scene and pixels with hits. Where both
+// means have one expectation, E[s] is 1. t is the threshold z as a quantile of Student's distribution with 2n - 2
+// degrees of freedom. V falls as 1/n, hence a neighbour that differs at all is left out in the end: the filter is
+// consistent.
 #pragma once
 
 #include <atomic>

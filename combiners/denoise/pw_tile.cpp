@@ -14,6 +14,7 @@ namespace {
 
 constexpr float kMinAlbedo = 0.03f;
 constexpr float kAlbedoSd = 0.25f, kNormalSd = 0.25f;
+constexpr float kApart = 100;  // far more than guides differ by: 2^-(100²) is nothing
 const float kAlbedoScale = std::sqrt(0.5f * kLog2E) / kAlbedoSd, kNormalScale = std::sqrt(0.5f * kLog2E) / kNormalSd;
 
 inline float finiteOrZero(float v) { return std::fabs(v) <= std::numeric_limits<float>::max() ? v : 0.0f; }
@@ -43,6 +44,10 @@ void divideRow(const float* __restrict in, const float* __restrict divisor, int 
 
 void divideBySquareRow(const float* __restrict in, const float* __restrict divisor, int count, float* __restrict out) {
   for (int x = 0; x < count; ++x) out[x] = in[x] / (divisor[x] * divisor[x]);
+}
+
+void setMissesApart(const float* __restrict depth, int count, float* __restrict guide) {
+  for (int x = 0; x < count; ++x) guide[x] += depth[x] == 0 ? kApart : 0.0f;
 }
 
 float inverseMeanDepth(const Features& features) {
@@ -113,7 +118,10 @@ void PatchWelchTile::storeFeatures(const Features& f, float depthScale, size_t f
   }
   for (size_t c = 0; c < 3 && !f.normal.mean.empty(); ++c)
     copyRow(&f.normal.mean[c][from], count, kNormalScale, -kMost, kMost, &guide[3 + c][at]);
-  if (z) copyRow(z, count, depthScale, -kMost, kMost, &depth[at]);
+  if (z) {
+    copyRow(z, count, depthScale, -kMost, kMost, &depth[at]);
+    setMissesApart(z, count, &guide[0][at]);
+  }
   if (!f.visibility.mean.empty()) copyRow(&f.visibility.mean[from], count, 1, -kMost, kMost, &visibility[at]);
 }
 

@@ -48,7 +48,8 @@ struct PatchWelchTile {
   Plane3 variance;               // variance of the mean / divisor²
   Plane3 divisor;                // max(albedo, 0.03); 1 on emitters, misses and without features
   // Albedo in [0, 1] and normal, times sqrt(log2(e) / (2 sd²)): 2^-|difference|² is the product of both Gaussian edge
-  // terms. Zero without features.
+  // terms. Zero without features. The first guide keeps pixels where every ray has missed the scene apart from those
+  // with hits: they hold no light of the scene's, and have no albedo by which an edge's light could be put back.
   std::array<PixelBuffer<float>, kGuides> guide;
   PixelBuffer<float> depth, visibility;  // depth in units of the mean depth; zero without features
 
