@@ -22,6 +22,15 @@ DoubleShrinkage doubleShrinkage(double unbiasedError, double biasedError, double
 // to too few of its neighbours (ALGORITHMS 1.4). At least 10⁻⁸ (x² + 10⁻⁴).
 Plane<float> unbiasedError(const Estimate& unbiased, const Rgb<float>& variance);
 
+// Raises E_u where the unbiased image is darker than the photon map over a whole window of 13 x 13 pixels: rare paths
+// have not been found there, and a variance knows nothing of samples that never came. The difference D of the window
+// means must be beyond 1.1 times the photon map's error E_b and three deviations of the unbiased mean; these are added
+// as roots, for the former may be a bias, of which noise takes nothing away. Then D² - E_b is the squared error that
+// E_b does not explain. D² would count it twice, which a photon map that is far off and says so turns into half of its
+// image.
+void countMissingLight(Plane<float>& error, const Estimate& unbiased, const Rgb<float>& variance,
+                       const Estimate& photonMap, const Plane<float>& photonMapError);
+
 // The square of the bias that an image estimates of itself less the variance of that estimate, averaged over channels:
 // unbiased but noisy, with negative values.
 Plane<float> squaredBiasSamples(const Estimate& photonMap);
@@ -45,11 +54,15 @@ Plane<float> totalError(const Estimate& photonMap, const PhotonMapError& error);
 Plane<float> biasedError(const Estimate& biased, const Estimate& unbiased, const Rgb<float>& variance,
                          const Features* features, bool measured = false);
 
-// eta²: the squared error of the prior, measured across halves as in error_map.h and averaged over 13 x 13 pixels
-// (ALGORITHMS 3.4). Residuals are first limited to 8 times the deviation of their surroundings: that of X, or the root
-// mean square of the other residuals, whichever is larger. With X's alone a prior that is wrong everywhere would keep a
-// weight of 1/127 however small the noise. At least 10⁻⁶ (x_p² + 10⁻²), so that a converged image is left alone.
-Plane<float> priorError(const Rgb<float>& prior, const Rgb<float> (&halves)[2], const Estimate& unbiased,
-                        const Rgb<float>& variance, const Plane<float>& unbiasedError);
+// eta²: the squared error of the prior, measured across halves as in error_map.h against those of x (the unbiased image
+// in the paper), and averaged over 13 x 13 pixels in units of the brightness, sqrt(level² + 0.01), as a noise is that
+// grows with it. As it is (ALGORITHMS 3.4), the errors of bright pixels keep the dark ones beside them noisy: behind a
+// door ajar 1.32 times the error at 128 samples, among many lights 1.13; over the squared brightness, those of dark
+// pixels blur the bright ones. `error` is the squared error of x. Residuals are first limited to 8 times the deviation
+// of their surroundings: that of x, or the root mean square of the other residuals, whichever is larger. With x's alone
+// a prior that is wrong everywhere would keep a weight of 1/127 however small the noise. At least 10⁻⁶ (x_p² + 10⁻²),
+// so that a converged image is left alone.
+Plane<float> priorError(const Rgb<float>& prior, const Rgb<float> (&halves)[2], const Estimate& x,
+                        const Rgb<float>& variance, const Plane<float>& error);
 
 }  // namespace braid

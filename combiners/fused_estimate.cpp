@@ -2,9 +2,7 @@
 #include "combiners/fused_estimate.h"
 
 #include <algorithm>
-#include <cmath>
 
-#include "combiners/box_mean.h"
 #include "combiners/channel_mean.h"
 #include "combiners/double_shrinkage.h"
 #include "combiners/ensemble_weights.h"
@@ -15,8 +13,6 @@
 namespace braid {
 
 namespace {
-
-constexpr int kRadius = 6;
 
 // Shares that sum to 1, proportional to the inverses of the errors.
 WeightMaps inverseErrorWeights(const std::vector<Plane<float>>& errors) {
@@ -30,27 +26,6 @@ WeightMaps inverseErrorWeights(const std::vector<Plane<float>>& errors) {
     }
   });
   return weights;
-}
-
-// Raises E_u where the unbiased image is darker than the photon map over a whole window: rare paths have not been found
-// there, and a variance knows nothing of samples that never came. The difference D of the window means must be beyond
-// the photon map's error and three deviations of the unbiased mean; these are added as roots, for the former may be a
-// bias, of which noise takes nothing away. Then D² - E_b is the squared error that E_b does not explain. D² would count
-// it twice, which a photon map that is far off and says so turns into half of its image.
-void countMissingLight(Plane<float>& error, const Estimate& unbiased, const Rgb<float>& variance,
-                       const Estimate& biased, const Plane<float>& biasedError) {
-  const auto value = [](const Rgb<float>& image) {
-    return [&image](size_t i, size_t c) { return static_cast<double>(image[c][i]); };
-  };
-  const Plane<double> x = boxMean(channelMean(variance, value(unbiased.mean)), kRadius);
-  const Plane<double> s = boxMean(channelMean(variance, value(biased.mean)), kRadius);
-  const Plane<double> v = boxMean(channelMean(variance, value(variance)), kRadius);
-  const double pixels = (2.0 * kRadius + 1) * (2.0 * kRadius + 1);
-  for (size_t i = 0; i < error.size(); ++i) {
-    const double missing = s[i] - x[i], explained = static_cast<double>(biasedError[i]);
-    if (missing > std::sqrt(explained) + 3 * std::sqrt(v[i] / pixels))
-      error[i] = std::max(error[i], finiteFloat(missing * missing - explained));
-  }
 }
 
 double squaredShare(const WeightMaps& weights, size_t k, size_t i) {

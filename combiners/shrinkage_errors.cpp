@@ -16,8 +16,11 @@ namespace braid {
 namespace {
 
 constexpr int kRadius = 6;
+constexpr int kLevelRadius = 1;         // of the brightness in whose units errors are averaged
+constexpr double kLevelEpsilon = 0.01;  // as in relL2
 constexpr double kWinsorise = 8;
 constexpr double kSignificance = 3;
+constexpr double kMargin = 1.1;  // what a bias may be off: of one of 10⁶, the roundings are light enough
 constexpr double kOutlier = 64;
 
 double at(const Rgb<float>& image, size_t i, size_t c) { return static_cast<double>(image[c][i]); }
@@ -142,23 +145,42 @@ Plane<float> biasedError(const Estimate& biased, const Estimate& unbiased, const
   return error;
 }
 
-Plane<float> priorError(const Rgb<float>& prior, const Rgb<float> (&halves)[2], const Estimate& unbiased,
-                        const Rgb<float>& variance, const Plane<float>& unbiasedError) {
+void countMissingLight(Plane<float>& error, const Estimate& unbiased, const Rgb<float>& variance,
+                       const Estimate& photonMap, const Plane<float>& photonMapError) {
+  const auto windowMeans = [&](const Rgb<float>& image) {
+    return boxMean(channelMean(image, [&image](size_t i, size_t c) { return at(image, i, c); }), kRadius);
+  };
+  const Plane<double> x = windowMeans(unbiased.mean), s = windowMeans(photonMap.mean), v = windowMeans(variance);
+  const double pixels = sqr(2.0 * kRadius + 1);
+  for (size_t i = 0; i < error.size(); ++i) {
+    const double missing = s[i] - x[i], explained = static_cast<double>(photonMapError[i]);
+    if (missing > kMargin * std::sqrt(explained) + kSignificance * std::sqrt(v[i] / pixels))
+      error[i] = std::max(error[i], finiteFloat(missing * missing - explained));
+  }
+}
+
+Plane<float> priorError(const Rgb<float>& prior, const Rgb<float> (&halves)[2], const Estimate& x,
+                        const Rgb<float>& variance, const Plane<float>& error) {
   const auto across = [&](size_t i, size_t c, double limit) {
     const auto square = [limit](double d) { return std::min(d * d, limit); };
-    return 0.5 * (square(at(halves[0], i, c) - at(unbiased.half[1], i, c)) +
-                  square(at(halves[1], i, c) - at(unbiased.half[0], i, c)));
+    return 0.5 *
+           (square(at(halves[0], i, c) - at(x.half[1], i, c)) + square(at(halves[1], i, c) - at(x.half[0], i, c)));
   };
   const Plane<double> around =
       trimmedMean(channelMean(prior, [&](size_t i, size_t c) { return across(i, c, HUGE_VAL); }));
-  const Plane<float> samples = channelMean(prior, [&](size_t i, size_t c) {
-    const double limit = kWinsorise * kWinsorise * std::max(2 * static_cast<double>(unbiasedError[i]), around[i]);
+  Plane<float> samples = channelMean(prior, [&](size_t i, size_t c) {
+    const double limit = kWinsorise * kWinsorise * std::max(2 * static_cast<double>(error[i]), around[i]);
     const double between = at(halves[0], i, c) - at(halves[1], i, c);
     return across(i, c, limit) - 2 * at(variance, i, c) - 0.25 * between * between;
   });
-  Plane<float> error = boxed(samples);
-  raise(error, prior, 1e-6, 1e-2);
-  return error;
+  const Plane<double> level =
+      boxMean(channelMean(prior, [&](size_t i, size_t c) { return at(prior, i, c); }), kLevelRadius);
+  const auto unit = [&](size_t i) { return std::sqrt(sqr(level[i]) + kLevelEpsilon); };
+  for (size_t i = 0; i < samples.size(); ++i) samples[i] = finiteFloat(static_cast<double>(samples[i]) / unit(i));
+  Plane<float> out = boxed(samples);
+  for (size_t i = 0; i < out.size(); ++i) out[i] = finiteFloat(static_cast<double>(out[i]) * unit(i));
+  raise(out, prior, 1e-6, 1e-2);
+  return out;
 }
 
 }  // namespace braid

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The bias of a photon map that it does not know of, as an unbiased image measures it, and what combiners make of it.
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <random>
 
 #include <doctest/doctest.h>
 
@@ -14,53 +12,16 @@
 #include "combiners/registry.h"
 #include "combiners/unknown_bias.h"
 #include "tests/combiner_fixture.h"
+#include "tests/noisy_images.h"
 
 using namespace braid;
 using namespace braid::test;
 
 namespace {
 
-constexpr int kWidth = 120, kHeight = 90;
-
-// An image of the given values whose halves have normal noise of this standard deviation, so that the mean's is
-// 1/sqrt(2) of it, and its variance.
-Estimate noisy(const std::function<double(int, int)>& value, double deviation, unsigned seed) {
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0, deviation);
-  Estimate e;
-  e.passes = 64;
-  e.mean = e.half[0] = e.half[1] = Rgb<float>(kWidth, kHeight);
-  e.variance = Rgb<float>(kWidth, kHeight, static_cast<float>(deviation * deviation / 2));
-  for (size_t c = 0; c < 3; ++c)
-    for (int y = 0; y < kHeight; ++y)
-      for (int x = 0; x < kWidth; ++x) {
-        for (Rgb<float>& half : e.half) half[c].at(x, y) = static_cast<float>(value(x, y) + normal(random));
-        e.mean[c].at(x, y) = 0.5f * (e.half[0][c].at(x, y) + e.half[1][c].at(x, y));
-      }
-  return e;
-}
-
-// A photon map that takes itself for unbiased.
-Estimate photonMap(const std::function<double(int, int)>& value, double deviation, unsigned seed) {
-  Estimate e = noisy(value, deviation, seed);
-  e.name = "sppm";
-  e.unbiased = false;
-  e.bias = e.biasVariance = Rgb<float>(kWidth, kHeight);
-  return e;
-}
-
-double one(int, int) { return 1; }
-
 // Every third column, as narrow leaves, has lost 0.3 of its light.
 double narrow(int x, int) { return x % 3 == 0 ? 0.7 : 1.0; }
 constexpr double kNarrowBias = 0.3 * 0.3 / 3;  // squared, on the average
-
-double squaredError(const Rgb<float>& image, double truth) {
-  double sum = 0;
-  for (size_t c = 0; c < 3; ++c)
-    for (const float v : image[c].data) sum += sqr(static_cast<double>(v) - truth);
-  return sum / (3.0 * kWidth * kHeight);
-}
 
 }  // namespace
 
