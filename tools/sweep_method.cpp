@@ -53,30 +53,42 @@ std::vector<SweepMethod> chooseMethods(const std::vector<std::string>& names, co
 }
 
 std::vector<std::vector<size_t>> groupMethods(const std::vector<SweepMethod>& methods, bool equalTime) {
-  const auto together = [&](const SweepMethod& a, const SweepMethod& b) {
-    if (a.inputs == b.inputs) return true;
-    return !equalTime && onePassEach(a) && onePassEach(b) && shareIntegrator(a, b);
+  const auto shareRender = [&](const SweepMethod& a, const SweepMethod& b) {
+    return a.inputs == b.inputs || (!equalTime && onePassEach(a) && onePassEach(b) && shareIntegrator(a, b));
   };
-  // Connected components: every method takes the smallest label among those it belongs together with.
+  // Those that read features, and those that do not, among themselves. Connected components: every method takes the
+  // smallest label among those it belongs together with.
   std::vector<size_t> label(methods.size());
   std::iota(label.begin(), label.end(), size_t(0));
   for (bool changed = true; changed;) {
     changed = false;
     for (size_t i = 0; i < methods.size(); ++i)
-      for (size_t j = 0; j < methods.size(); ++j)
-        if (label[j] < label[i] && together(methods[i], methods[j])) {
-          label[i] = label[j];
-          changed = true;
-        }
+      for (size_t j = 0; j < methods.size(); ++j) {
+        const SweepMethod &a = methods[i], &b = methods[j];
+        const bool alike = a.features == b.features && (!a.features || a.inputs.front() == b.inputs.front());
+        if (label[j] >= label[i] || !alike || !shareRender(a, b)) continue;
+        label[i] = label[j];
+        changed = true;
+      }
   }
-  std::vector<std::vector<size_t>> groups;
-  for (size_t root = 0; root < methods.size(); ++root) {
-    std::vector<size_t> members;
-    for (size_t i = 0; i < methods.size(); ++i)
-      if (label[i] == root) members.push_back(i);
-    if (!members.empty()) groups.push_back(std::move(members));
+  // Whoever reads no features joins the first of the others that shares a render with one of its group.
+  for (size_t i = 0; i < methods.size(); ++i) {
+    if (methods[i].features) continue;
+    const auto host = std::find_if(methods.begin(), methods.end(),
+                                   [&](const SweepMethod& m) { return m.features && shareRender(m, methods[i]); });
+    if (host == methods.end()) continue;
+    const size_t from = label[i], to = label[static_cast<size_t>(host - methods.begin())];
+    std::replace(label.begin(), label.end(), from, to);
   }
-  return groups;
+  std::vector<std::vector<size_t>> groups(methods.size());
+  std::vector<size_t> order;  // of the labels, by their first methods
+  for (size_t i = 0; i < methods.size(); ++i) {
+    if (groups[label[i]].empty()) order.push_back(label[i]);
+    groups[label[i]].push_back(i);
+  }
+  std::vector<std::vector<size_t>> out;
+  for (const size_t l : order) out.push_back(std::move(groups[l]));
+  return out;
 }
 
 }  // namespace braid

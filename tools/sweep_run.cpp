@@ -139,9 +139,11 @@ double SweepJob::lastMark() const {
 
 std::vector<MethodShare> SweepJob::inputs() const {
   std::vector<MethodShare> inputs;
-  for (const Cell& c : cells)
-    for (const MethodShare& i : c.method->inputs)
-      if (std::find(inputs.begin(), inputs.end(), i) == inputs.end()) inputs.push_back(i);
+  for (const bool reads : {true, false})  // the first integrator makes the features
+    for (const Cell& c : cells)
+      for (const MethodShare& i : c.method->inputs)
+        if (c.method->features == reads && std::find(inputs.begin(), inputs.end(), i) == inputs.end())
+          inputs.push_back(i);
   return inputs;
 }
 
