@@ -20,7 +20,7 @@ constexpr int kLevelRadius = 1;         // of the brightness in whose units erro
 constexpr double kLevelEpsilon = 0.01;  // as in relL2
 constexpr double kWinsorise = 8;
 constexpr double kSignificance = 3;
-constexpr double kMargin = 1.1;  // what a bias may be off: of one of 10⁶, the roundings are light enough
+constexpr double kMargin = 1.1;  // of an error that is an estimate, too: the roundings of one of 10⁶ would be light
 constexpr double kOutlier = 64;
 
 double at(const Rgb<float>& image, size_t i, size_t c) { return static_cast<double>(image[c][i]); }

@@ -349,6 +349,10 @@ TEST_CASE("Methods read the features of their own first integrator, whatever els
   filter.features = mixed.features = other.features = true;
   using Groups = std::vector<std::vector<size_t>>;
   CHECK(groupMethods({sppm, bdpt, pt, filter, mixed, other, vcm}, false) == Groups{{0, 2, 3, 4}, {1, 5}, {6}});
+  // One that joins two of them without features makes no one of them.
+  SweepMethod both;
+  both.inputs = {{"pt", 1}, {"bdpt", 1}};
+  CHECK(groupMethods({pt, bdpt, both, filter, other}, false) == Groups{{0, 1, 2, 3}, {4}});
   // Of the methods of a job, one that reads features is asked first.
   SweepJob job;
   job.cells = {{&sppm, 8}, {&mixed, 8}};

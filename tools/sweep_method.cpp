@@ -73,7 +73,10 @@ std::vector<std::vector<size_t>> groupMethods(const std::vector<SweepMethod>& me
   }
   // Whoever reads no features joins the first of the others that shares a render with one of its group.
   for (size_t i = 0; i < methods.size(); ++i) {
-    if (methods[i].features) continue;
+    const auto readsFeatures = [&](size_t j) { return methods[j].features && label[j] == label[i]; };
+    bool hosted = false;
+    for (size_t j = 0; j < methods.size(); ++j) hosted = hosted || readsFeatures(j);
+    if (hosted) continue;
     const auto host = std::find_if(methods.begin(), methods.end(),
                                    [&](const SweepMethod& m) { return m.features && shareRender(m, methods[i]); });
     if (host == methods.end()) continue;
