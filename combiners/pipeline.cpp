@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "combiners/half_estimate.h"
 #include "combiners/plane_mean.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
@@ -173,6 +174,14 @@ MethodInputs Runner::inputsOf(const Step& step) const {
       other.unbiased = &moved;
       return method->run(other).image.mean;
     };
+    if (maker->step.method->halvesShareWeights() && hasHalfEstimates(*again.unbiased, again.quarters))
+      in.denoiseHalf = [again, method = maker->step.method](int h) {
+        const Estimate half = halfEstimate(*again.unbiased, again.quarters, h);
+        MethodInputs other = again;
+        other.unbiased = &half;
+        other.quarters = {};
+        return method->run(other).image.mean;
+      };
   }
   return in;
 }

@@ -10,6 +10,7 @@ namespace braid {
 namespace {
 
 constexpr int kColour = 3 * sizeof(float);
+constexpr int kHalfEstimate = 4 * kColour;         // mean, variance, two halves
 constexpr int kFeatureComponents = 3 + 3 + 1 + 1;  // albedo, normal, depth, visibility
 
 int imagesOf(const EstimateFacts& e) {
@@ -25,25 +26,32 @@ int historyOf(const EstimateFacts& e) {
   return e.checkpoints * kColour + static_cast<int>(e.kept.size()) * 3 * kColour;
 }
 
-MemoryCase caseOf(const Step& step, const Facts& facts) {
+MemoryCase caseOf(const Step& step, const Recipe& recipe, const Facts& facts) {
   MemoryCase c;
   if (const EstimateFacts* e = facts.find(step.unbiased)) c.passes = step.kept > 0 ? step.kept : e->passes;
   c.bases = static_cast<int>(step.bases.size());
   for (const std::string& base : step.bases)
     if (const EstimateFacts* e = facts.find(base); e && e->bias) ++c.photonMaps;
   if (const EstimateFacts* e = facts.find(step.biased)) c.photonMap = e->bias;
+  const Step* denoiser = recipe.find(step.biased);
+  const EstimateFacts* e = facts.find(step.unbiased);
+  c.denoiseHalf = denoiser && denoiser->method->halvesShareWeights() && denoiser->kept == 0 && e && e->halves &&
+                  e->quarters && (e->passes == 0 || e->passes >= 4);
   return c;
 }
 
 // Of the step itself. A method that runs the denoiser of its input again holds that one's memory too, and a copy of the
-// estimate with another mean.
-MethodMemory memoryOf(const Step& step, const Recipe& recipe, const Facts& facts) {
-  MethodMemory memory = step.method->memory(caseOf(step, facts));
+// estimate with another mean, or one of half the samples. `given` are the facts before `facts` were copied.
+MethodMemory memoryOf(const Step& step, const Recipe& recipe, const Facts& facts, const Facts& given) {
+  const MemoryCase of = caseOf(step, recipe, given);
+  MethodMemory memory = step.method->memory(of);
   const Step* denoiser = recipe.find(step.biased);
   const EstimateFacts* e = facts.find(step.unbiased);
-  if (!step.method->needs().redenoise || !denoiser || !e) return memory;
-  const MethodMemory again = denoiser->method->memory(caseOf(*denoiser, facts));
-  memory.peak = std::max(memory.peak, memory.besideRedenoising + again.peak + imagesOf(*e));
+  const bool redenoise = step.method->needs().redenoise;
+  if ((!redenoise && memory.besideRedenoising == 0) || !denoiser || !e) return memory;
+  const MethodMemory again = denoiser->method->memory(caseOf(*denoiser, recipe, given));
+  memory.peak =
+      std::max(memory.peak, memory.besideRedenoising + again.peak + (redenoise ? imagesOf(*e) : kHalfEstimate));
   memory.eachThread = std::max(memory.eachThread, again.eachThread);
   return memory;
 }
@@ -79,7 +87,7 @@ uint64_t pipelineMemory(const Recipe& recipe, const Facts& given, uint64_t pixel
   uint64_t kept = 0, peak = 0;           // bytes
   for (const Step& step : recipe.steps) {
     if (!step.obstacle.empty()) continue;
-    const MethodMemory memory = memoryOf(step, recipe, facts);
+    const MethodMemory memory = memoryOf(step, recipe, facts, given);
     peak = std::max(
         peak, kept + pixels * static_cast<uint64_t>(memory.peak) + memory.eachThread * static_cast<uint64_t>(threads));
     kept += pixels * static_cast<uint64_t>(memory.kept);

@@ -86,7 +86,7 @@ TEST_CASE("the pipeline takes the memory that follows from a recipe") {
   c.estimates.reference = c.truth;
   const Facts facts = factsOf(c.estimates);
   for (const std::vector<std::string>& wanted : std::vector<std::vector<std::string>>{
-           {"auto"}, {"js@nfor"}, {"ensemble@pw+nlm+rdfc"}, {"curves@nlm"}, {"ideal@pw"}}) {
+           {"auto"}, {"js@nfor"}, {"js@rdfc"}, {"ensemble@pw+nlm+rdfc"}, {"curves@nlm"}, {"ideal@pw"}}) {
     const uint64_t stated = pipelineMemory(makeRecipe(facts, wanted, {}), facts, kWidth * kHeight, kThreads);
     const int64_t before = heapBytes();
     resetHeapPeak();

@@ -49,6 +49,7 @@ class Rdfc : public Method {
     return needs;
   }
   MethodMemory memory(const MemoryCase& /*of*/) const override { return {496, 52}; }
+  bool halvesShareWeights() const override { return true; }
   std::vector<OptionInfo> options() const override { return {kDemodulate, kVariance, kDespike}; }
 
   MethodResult run(const MethodInputs& in) const override {

@@ -77,6 +77,9 @@ struct MethodInputs {
   const std::vector<Checkpoint>* history = nullptr;  // of the unbiased estimate, oldest first
   // Runs the denoiser that made `biased` on another colour image, everything else unchanged.
   std::function<Rgb<float>(const Rgb<float>&)> redenoise;
+  // Runs it on half h (0 or 1) of its colour alone. Null: its halves share no weights anyway, or there are no quarters,
+  // which tell the noise of a half.
+  std::function<Rgb<float>(int h)> denoiseHalf;
   uint64_t seed = 0;
   MethodOptions options;
   const std::atomic<bool>* cancel = nullptr;  // a cancelled method may return anything
@@ -101,10 +104,11 @@ struct MethodResult {
 
 // What the memory of a method depends on.
 struct MemoryCase {
-  uint64_t passes = 0;     // of the unbiased estimate; 0: not known
-  int bases = 0;           // images to choose from,
-  int photonMaps = 0;      // of which so many are biased estimates
-  bool photonMap = false;  // whether the biased input is one
+  uint64_t passes = 0;       // of the unbiased estimate; 0: not known
+  int bases = 0;             // images to choose from,
+  int photonMaps = 0;        // of which so many are biased estimates
+  bool photonMap = false;    // whether the biased input is one
+  bool denoiseHalf = false;  // whether there is MethodInputs::denoiseHalf
 };
 
 // Bytes a pixel. The inputs are not counted.
@@ -112,7 +116,7 @@ struct MethodMemory {
   int peak = 0;               // at the most at a time, result included
   int kept = 0;               // of the result
   uint64_t eachThread = 0;    // bytes in all that every thread takes besides
-  int besideRedenoising = 0;  // held while Needs::redenoise runs
+  int besideRedenoising = 0;  // held while MethodInputs::redenoise or denoiseHalf runs
 };
 
 enum class MethodKind { Denoiser, Combiner };
@@ -124,9 +128,12 @@ class Method {
   virtual const char* description() const = 0;
   virtual MethodKind kind() const = 0;
   virtual Needs needs() const = 0;
-  // To 10 % (tests/test_combining_memory.cpp), without what Needs::redenoise takes.
+  // To 10 % (tests/test_combining_memory.cpp), without what MethodInputs::redenoise and denoiseHalf take.
   virtual MethodMemory memory(const MemoryCase& of) const = 0;
   virtual std::vector<OptionInfo> options() const { return {}; }
+  // Whether a half of the result depends on the other half of the colour, as where weights are made of all samples.
+  // Such a denoiser asks for quarters (Needs::quartersHelp).
+  virtual bool halvesShareWeights() const { return false; }
   // Deterministic for any number of threads. A denoiser reads inputs.unbiased and inputs.features.
   virtual MethodResult run(const MethodInputs& inputs) const = 0;
 };
