@@ -6,13 +6,15 @@
 //   3. bases: patch-Welch filters of x, and the denoisers that the user asked for;
 //   4. candidates: every base, and x shrunk towards it (shrinkage.h);
 //   5. an ensemble of the candidates, with errors measured across halves (relative_weights.h);
-//   6. the error map (error_map.h), plus the squared bias that the photon maps admit.
+//   6. the result filtered once more, where halves show its use (second_pass.h);
+//   7. the error map (error_map.h), plus the squared bias that the photon maps admit.
 // x itself is no candidate: halves cannot see the error of an outlier in the half that holds it.
 #include <algorithm>
 #include <array>
 
 #include "combiners/denoise/pw1_filter.h"
 #include "combiners/denoise/pw_filter.h"
+#include "combiners/denoise/variance.h"
 #include "combiners/despike.h"
 #include "combiners/error_map.h"
 #include "combiners/finite_float.h"
@@ -20,6 +22,7 @@
 #include "combiners/recipe.h"
 #include "combiners/registry.h"
 #include "combiners/relative_weights.h"
+#include "combiners/second_pass.h"
 #include "combiners/shrinkage.h"
 
 namespace braid {
@@ -29,6 +32,7 @@ namespace {
 const OptionInfo kPatch{"auto-patch", 15, "Width in pixels of the patches that errors are summed over"};
 const OptionInfo kFuse{"auto-fuse", 1, "0: photon maps are bases, not part of the image that is denoised"};
 const OptionInfo kShrink{"auto-shrink", 1, "0: bases only, without James-Stein shrinkage towards them"};
+const OptionInfo kSecondPass{"auto-second-pass", 1, "0: the combined image is not filtered once more"};
 const OptionInfo kDespike{"auto-despike", 1, "0: keep outliers"};
 
 constexpr uint64_t kFewestPasses = 4;       // fewer: the first filter alone
@@ -49,12 +53,12 @@ class Auto : public Method {
   Needs needs() const override {
     Needs needs;
     needs.anyBases = true;
-    needs.features = true;
+    needs.features = needs.featureNoise = true;
     needs.quartersHelp = true;
     return needs;
   }
   MethodMemory memory(const MemoryCase& of) const override;
-  std::vector<OptionInfo> options() const override { return {kPatch, kFuse, kShrink, kDespike}; }
+  std::vector<OptionInfo> options() const override { return {kPatch, kFuse, kShrink, kDespike, kSecondPass}; }
   MethodResult run(const MethodInputs& in) const override;
 };
 
@@ -70,7 +74,8 @@ MethodMemory Auto::memory(const MemoryCase& of) const {
   const int fused = of.photonMaps > 0 ? 112 : 0, others = of.bases - of.photonMaps;
   if (of.passes > 0 && of.passes < kFewestPasses) return {48 + fused + 36 * others, 36, 2'300'000};
   const int bases = others + 2;
-  return {44 + 88 * bases + fused, 40 + 8 * bases};
+  const int secondPass = 305 + 16 * bases;
+  return {std::max(44 + 88 * bases, secondPass) + fused, 44 + 8 * bases};
 }
 
 // Whether errors can be measured across halves. Images of other renderers may not tell their passes.
@@ -153,6 +158,18 @@ std::vector<Estimate> shrunkTowards(const std::vector<Estimate>& bases, const Es
   return out;
 }
 
+// The image of a result filtered once more, as far as the halves of x ask for it. Its planes are the weights so far.
+void filterAgain(const Estimate& x, const MethodInputs& in, int patchRadius, MethodResult& result) {
+  const Estimate first = std::move(result.image), second = secondPass(first, in.features, passesOf(x), in.cancel);
+  if (in.cancel && in.cancel->load()) return;
+  const std::vector<const Estimate*> both = {&second, &first};
+  const WeightMaps shares = relativeWeights(x, both, first.mean, x.variance, in.features, patchRadius);
+  result.image = weightedEstimate(shares, both);
+  for (NamedPlane& map : result.aovs)
+    for (size_t i = 0; i < map.plane.size(); ++i) map.plane[i] *= shares.of(1, 0)[i];
+  result.aovs.push_back({"weight.auto.second-pass", shares.of(0, 0)});
+}
+
 Attribute countRemark(const char* name, size_t count) {
   Attribute a;
   a.name = name;
@@ -220,8 +237,10 @@ MethodResult Auto::run(const MethodInputs& in) const {
   std::vector<Plane<float>> maps = channelMeans(weights);
   for (size_t b = 0; b < candidates.size(); ++b)
     result.aovs.push_back({"weight.auto." + layerName(candidates[b]->name), std::move(maps[b])});
-  shrunk.clear();  // their memory is what the error map needs
+  shrunk.clear();  // their memory is what the second pass and the error map need
   bases.clear();
+  if (in.options.number(kSecondPass) != 0) filterAgain(x, in, patchRadius, result);
+  if (cancelled()) return result;
   result.error =
       errorMap(result.image.half, x, fused.noise.empty() ? x.variance : fused.noise, result.image.mean, true);
   if (!fused.squaredBias.empty()) addTo(result.error, smoothedSquaredBias(fused.squaredBias, result.image.mean));

@@ -186,8 +186,9 @@ TEST_CASE("What no method reads is not copied") {
   const auto read = [&](const char* method) { return planesRead(makeRecipe(factsOf(all), {method}, {})); };
   CHECK(read("nfor").featureNoise);
   CHECK_FALSE(read("nfor").quarters);
-  CHECK(read("auto").features);
-  CHECK_FALSE(read("auto").featureNoise);
+  CHECK(read("auto").featureNoise);
+  CHECK(read("pw").features);
+  CHECK_FALSE(read("pw").featureNoise);
   CHECK_FALSE(read("auto").history);
   CHECK(read("curves@nlm").history);
   CHECK_FALSE(read("box").features);

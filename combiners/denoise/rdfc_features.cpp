@@ -26,28 +26,36 @@ template <class Factor>
 RawChannel mapped(const Plane<float>& mean, const Plane<float>& a, const Plane<float>& b, const Plane<float>& variance,
                   const Factor& factor, float offset) {
   const auto affine = [&](const Plane<float>& in) {
-    Plane<float> out = in;
-    for (size_t i = 0; i < out.size(); ++i) out[i] = factor(i) * finiteOrZero(in[i]) + offset;
+    Plane<float> out(in.width, in.height, kUnfilled);
+    parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) out[i] = factor(i) * finiteOrZero(in[i]) + offset;
+    });
     return out;
   };
-  RawChannel out = {affine(mean), variance, {affine(a), affine(b)}};
-  for (size_t i = 0; i < out.variance.size(); ++i)
-    out.variance[i] = factor(i) * factor(i) * std::max(0.0f, finiteOrZero(variance[i]));
+  RawChannel out = {affine(mean), Plane<float>(variance.width, variance.height, kUnfilled), {affine(a), affine(b)}};
+  parallelChunks(variance.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i)
+      out.variance[i] = factor(i) * factor(i) * std::max(0.0f, finiteOrZero(variance[i]));
+  });
   return out;
 }
 
+const Plane<float> kNone;
+
 template <class Factor>
-RawFeature mappedFeature(const FeaturePlanes<Rgb<float>>& f, const Factor& factor, float offset) {
+RawFeature mappedFeature(const FeaturePlanes<Rgb<float>>& f, bool halves, const Factor& factor, float offset) {
   RawFeature out;
   for (size_t c = 0; c < 3 && !f.mean.empty(); ++c)
-    out.push_back(mapped(f.mean[c], f.half[0][c], f.half[1][c], f.variance[c], factor, offset));
+    out.push_back(
+        mapped(f.mean[c], halves ? f.half[0][c] : kNone, halves ? f.half[1][c] : kNone, f.variance[c], factor, offset));
   return out;
 }
-RawFeature mappedFeature(const FeaturePlanes<Plane<float>>& f, float factor) {
+RawFeature mappedFeature(const FeaturePlanes<Plane<float>>& f, bool halves, float factor) {
   RawFeature out;
   if (!f.mean.empty())
     out.push_back(mapped(
-        f.mean, f.half[0], f.half[1], f.variance, [factor](size_t) { return factor; }, 0));
+        f.mean, halves ? f.half[0] : kNone, halves ? f.half[1] : kNone, f.variance, [factor](size_t) { return factor; },
+        0));
   return out;
 }
 
@@ -61,16 +69,26 @@ float inverseQuantile(const Plane<float>& depth) {
   return 1 / std::max(hits[static_cast<size_t>(at)], 1 / kLargest);
 }
 
-std::vector<RawFeature> rawFeatures(const Features& f) {
+constexpr int kFeatures = 4;
+
+// One of them at a time, for its copies take memory; empty where it is missing.
+RawFeature rawFeature(const Features& f, int which, bool halves) {
   const Rgb<float>& albedo = f.albedo.mean;
   const auto compress = [&albedo](size_t i) {
     return 1 / std::max(1.0f, std::max(std::max(finiteOrZero(albedo[0][i]), finiteOrZero(albedo[1][i])),
                                        finiteOrZero(albedo[2][i])));
   };
-  return {mappedFeature(
-              f.normal, [](size_t) { return 0.5f; }, 0.5f),
-          mappedFeature(f.albedo, compress, 0), mappedFeature(f.depth, inverseQuantile(f.depth.mean)),
-          mappedFeature(f.visibility, 1)};
+  const auto half = [](size_t) { return 0.5f; };
+  switch (which) {
+    case 0:
+      return mappedFeature(f.normal, halves, half, 0.5f);
+    case 1:
+      return mappedFeature(f.albedo, halves, compress, 0);
+    case 2:
+      return mappedFeature(f.depth, halves, inverseQuantile(f.depth.mean));
+    default:
+      return mappedFeature(f.visibility, halves, 1);
+  }
 }
 
 // Without variation nothing is kept apart.
@@ -103,6 +121,12 @@ Plane<float> variancePlane(const RawChannel& c, uint64_t passes) {
   return Plane<float>(c.mean.width, c.mean.height);
 }
 
+RdfcChannel channelOf(const Plane<float>& mean, const Plane<float>& variance) {
+  Plane<float> spread = squaredGradient(mean);
+  for (size_t i = 0; i < spread.size(); ++i) spread[i] = std::max(spread[i], variance[i]);
+  return {MirroredPlane(mean), MirroredPlane(variance), MirroredPlane(spread)};
+}
+
 RdfcGuide filteredFeature(const RawFeature& raw, uint64_t passes, const std::atomic<bool>* cancel) {
   RdfcGuide own(raw.size());
   std::vector<MirroredPlane> targets;
@@ -129,9 +153,7 @@ RdfcGuide filteredFeature(const RawFeature& raw, uint64_t passes, const std::ato
       for (size_t i = 0; i < mean.size(); ++i) mean[i] = shareA * a[i] + (1 - shareA) * b[i];
       variance = rdfcHalvesVariance(a, b, passes);
     }
-    Plane<float> spread = squaredGradient(mean);
-    for (size_t i = 0; i < spread.size(); ++i) spread[i] = std::max(spread[i], variance[i]);
-    out[c] = {MirroredPlane(mean), MirroredPlane(variance), MirroredPlane(spread)};
+    out[c] = channelOf(mean, variance);
   }
   return out;
 }
@@ -164,8 +186,22 @@ Plane<float> rdfcHalvesVariance(const Plane<float>& a, const Plane<float>& b, ui
 
 std::vector<RdfcGuide> rdfcFeatures(const Features& features, uint64_t passes, const std::atomic<bool>* cancel) {
   std::vector<RdfcGuide> out;
-  for (const RawFeature& raw : rawFeatures(features))
+  for (int k = 0; k < kFeatures; ++k) {
+    const RawFeature raw = rawFeature(features, k, true);
     if (varies(raw)) out.push_back(filteredFeature(raw, passes, cancel));
+  }
+  return out;
+}
+
+std::vector<RdfcGuide> rdfcRawFeatures(const Features& features) {
+  std::vector<RdfcGuide> out;
+  for (int k = 0; k < kFeatures; ++k) {
+    const RawFeature raw = rawFeature(features, k, false);
+    if (!varies(raw)) continue;
+    RdfcGuide guide;
+    for (const RawChannel& c : raw) guide.push_back(channelOf(c.mean, variancePlane(c, 2)));
+    out.push_back(std::move(guide));
+  }
   return out;
 }
 

@@ -25,4 +25,8 @@ Plane<float> rdfcHalvesVariance(const Plane<float>& a, const Plane<float>& b, ui
 std::vector<RdfcGuide> rdfcFeatures(const Features& features, uint64_t passes,
                                     const std::atomic<bool>* cancel = nullptr);
 
+// The same features as they are, with their own variance, 0 where it is not known: for images that have little noise
+// left.
+std::vector<RdfcGuide> rdfcRawFeatures(const Features& features);
+
 }  // namespace braid
