@@ -130,3 +130,13 @@ TEST_CASE("js towards RDFC is better than the unbiased image where neighbours di
   CHECK(apart < noise);
   CHECK(apart < 0.95 * shared);
 }
+
+TEST_CASE("Denoisers whose halves share weights ask for the quarters that tell them apart") {
+  int sharing = 0;
+  for (const auto& m : makeMethods())
+    if (m->halvesShareWeights()) {
+      CHECK(m->needs().quartersHelp);
+      ++sharing;
+    }
+  CHECK(sharing == 1);
+}
