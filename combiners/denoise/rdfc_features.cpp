@@ -199,7 +199,8 @@ std::vector<RdfcGuide> rdfcRawFeatures(const Features& features) {
     const RawFeature raw = rawFeature(features, k, false);
     if (!varies(raw)) continue;
     RdfcGuide guide;
-    for (const RawChannel& c : raw) guide.push_back(channelOf(c.mean, variancePlane(c, 2)));
+    for (const RawChannel& c : raw)
+      guide.push_back(channelOf(c.mean, c.variance.empty() ? Plane<float>(c.mean.width, c.mean.height) : c.variance));
     out.push_back(std::move(guide));
   }
   return out;
