@@ -166,7 +166,9 @@ void filterAgain(const Estimate& x, const MethodInputs& in, int patchRadius, Met
   const WeightMaps shares = relativeWeights(x, both, first.mean, x.variance, in.features, patchRadius);
   result.image = weightedEstimate(shares, both);
   for (NamedPlane& map : result.aovs)
-    for (size_t i = 0; i < map.plane.size(); ++i) map.plane[i] *= shares.of(1, 0)[i];
+    parallelChunks(map.plane.size(), kPixelChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) map.plane[i] *= shares.of(1, 0)[i];
+    });
   result.aovs.push_back({"weight.auto.second-pass", shares.of(0, 0)});
 }
 

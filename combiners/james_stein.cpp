@@ -16,8 +16,9 @@
 //     plates, towards box, 0.84 of the unbiased image's error at 32 samples instead of 3.7, 0.91 at 128 instead
 //     of 2.2.
 //   - Halves that a denoiser filtered with the weights of all samples hide their noise from all of the above. Where the
-//     quarters allow it, it is run again on each half by itself (js-own-halves): towards rdfc, at twice its time, 0.95
-//     of the unbiased image's error on leaves at 128 samples instead of 1.03, and 0.98 of before on 14 scenes.
+//     quarters allow it, it is run again on each half by itself (js-own-halves): towards rdfc, which that takes twice
+//     more, 0.95 of the unbiased image's error on leaves at 128 samples instead of 1.03, and 0.98 of before on 14
+//     scenes.
 // A constant of 1.25 is a little worse in all of these than the paper's 1.
 //
 // Halves of the result. With js-regression the half h is JS(X^h, its variance, own fit of half h): the halves share the

@@ -12,9 +12,10 @@
 
 namespace braid {
 
-// The image and its halves, all with the same weights, by non-local means over 9x9 pixels (rdfc_window.h) with the
-// variance between the halves, and by features with their own noise. `passes` are those behind the image and the
-// features, at least 2; the features may be null. Has no variance, as it comes. Black tiles once `cancel` is set.
+// The image and its halves, all with the same weights, by non-local means over 9x9 pixels
+// (rdfc_second_pass.h) with the variance between the halves, and by features with their own noise. `passes` are those
+// behind the image and the features, at least 2; the features may be null. Has no variance, as it comes. Black tiles
+// once `cancel` is set.
 Estimate secondPass(const Estimate& image, const Features* features, uint64_t passes,
                     const std::atomic<bool>* cancel = nullptr);
 

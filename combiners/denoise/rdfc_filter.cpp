@@ -6,6 +6,7 @@
 #include "combiners/denoise/alike_range.h"
 #include "combiners/denoise/rdfc_candidates.h"
 #include "combiners/denoise/rdfc_features.h"
+#include "combiners/denoise/rdfc_second_pass.h"
 #include "combiners/denoise/rdfc_window.h"
 #include "combiners/denoise/variance.h"
 #include "combiners/despike.h"
@@ -165,27 +166,12 @@ std::vector<Rgb<float>> blended(const std::vector<RdfcCandidate>& candidates, co
   return out;
 }
 
-// The blended images once more, guided by their own mean. The last two are halves.
 std::vector<Rgb<float>> secondPass(const std::vector<Rgb<float>>& images, const std::vector<float>& shares,
                                    const std::vector<RdfcGuide>& features, uint64_t passes,
                                    const std::atomic<bool>* cancel) {
-  std::vector<MirroredPlane> targets;
-  for (const Rgb<float>& image : images)
-    for (size_t c = 0; c < 3; ++c) targets.emplace_back(image[c]);
-  const Rgb<float> mean = weightedSum(images, shares);
-  const Rgb<float>&a = images[images.size() - 2], &b = images.back();
-  RdfcGuide guide;
-  for (size_t c = 0; c < 3; ++c)
-    guide.push_back({MirroredPlane(mean[c]), MirroredPlane(rdfcHalvesVariance(a[c], b[c], passes)), {}});
-  RdfcWindowFilter filter;
-  filter.guide = &guide;
-  filter.k = 0.45f;
-  filter.spread = rdfc::Spread::Own;
-  filter.features = features.empty() ? nullptr : &features;
-  std::vector<Plane<float>> filtered = rdfcFiltered(filter, targets, cancel);
-  std::vector<Rgb<float>> out(images.size());
-  for (size_t p = 0; p < filtered.size(); ++p) out[p / 3][p % 3] = std::move(filtered[p]);
-  return out;
+  std::vector<const Rgb<float>*> all;
+  for (const Rgb<float>& image : images) all.push_back(&image);
+  return rdfcSecondPass(all, weightedSum(images, shares), features, passes, {}, cancel);
 }
 
 Plane<float> blendedRisk(const Selection& s, const Rgb<float>& divisor) {
