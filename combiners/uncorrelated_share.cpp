@@ -19,7 +19,7 @@ std::array<Plane<float>, 3> combinedShares(const Estimate& y, const Rgb<float>& 
                                            const Rgb<float>& noise) {
   std::array<Plane<float>, 3> out;
   for (size_t c = 0; c < 3; ++c) {
-    const Plane<double> unit = squareUnits(y.mean[c], z[c], noise[c]);
+    const Plane<double> unit = squareUnits(y.mean[c], z[c], noise[c], LevelOf::AlikeInNoise);
     Plane<double> products(unit.width, unit.height), squares(unit.width, unit.height);
     parallelChunks(products.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {

@@ -16,7 +16,7 @@ namespace braid {
 // argument of the paper for its weights. A rare strong sample is not lost: where its neighbours have taken their parts
 // of it, it is in the window of all of them, for that is as wide as the filter's.
 //
-// u is one over squareUnits() of y, z and `noise`, noiseLevels() or empty.
+// u is one over squareUnits() of y, z and `noise`, noiseLevels() or empty, with levels of pixels alike in noise.
 std::array<Plane<float>, 3> combinedShares(const Estimate& y, const Rgb<float>& z, const Rgb<float> (&combined)[2],
                                            const Rgb<float>& noise);
 

@@ -223,6 +223,33 @@ TEST_CASE("Pairs with a lamp are left out, those with a rare strong sample are n
   }
 }
 
+// One strong sample each, as far as their own statistics tell; but rare ones do not meet.
+TEST_CASE("Strong samples of neighbours are a lamp: theirs is the noise of the place") {
+  constexpr int kSize = 31, kLamp = 15;
+  const Rgb<float> z(kSize, kSize, 0.1f), nothing(kSize, kSize, 0.0f);
+  const auto levelsOf = [&](int side, Rgb<float>& out) {
+    Rgb<float> y = z, variance(kSize, kSize, 1e-4f);
+    for (size_t c = 0; c < 3; ++c)
+      for (int v = kLamp; v < kLamp + side; ++v)
+        for (int u = kLamp; u < kLamp + side; ++u) {
+          y[c].at(u, v) += 5;
+          variance[c].at(u, v) = u == kLamp ? 25 : 4;  // of samples as different as 1 to 2.5
+        }
+    const Rgb<float> levels = noiseLevels(y, variance);
+    out = uncorrelatedFiltered({&y, &z, &nothing, &nothing, 16, &levels, 30}, 0.5);
+    return levels;
+  };
+  Rgb<float> lone, lamp;
+  const Rgb<float> ofLone = levelsOf(1, lone), ofLamp = levelsOf(2, lamp);
+  for (size_t c = 0; c < 3; ++c) {
+    CHECK(ofLone[c].at(kLamp, kLamp) < 0.01f);
+    CHECK(ofLamp[c].at(kLamp, kLamp) == 25);
+    CHECK(ofLamp[c].at(kLamp + 1, kLamp + 1) == 4);
+    CHECK(lone[c].at(kLamp + 4, kLamp) - 0.1f > 0.02f);
+    CHECK(lamp[c].at(kLamp + 4, kLamp) == doctest::Approx(0.1));
+  }
+}
+
 TEST_CASE("Images from gradients are crossed: their halves meet the other halves of the samples") {
   Case c = makeCase();
   c.estimates.estimates[1].correlation = Correlation::Gradients;

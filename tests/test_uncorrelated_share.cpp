@@ -5,8 +5,10 @@
 
 #include <doctest/doctest.h>
 
+#include "combiners/mirror.h"
 #include "combiners/plane_mean.h"
 #include "combiners/registry.h"
+#include "combiners/square_units.h"
 #include "combiners/uncorrelated_share.h"
 #include "tests/combiner_fixture.h"
 
@@ -92,6 +94,61 @@ TEST_CASE("The sign of the differences does not matter, and images that agree st
       CHECK(a[k][i] == b[k][i]);
       CHECK((a[k][i] >= 0 && a[k][i] <= 1));
     }
+}
+
+TEST_CASE("Levels of units are those of the pixels around, or of the ones that are alike in noise") {
+  const Case c = makeCase();
+  const Plane<float>&a = c.pt().mean[1], &b = c.crn().mean[1];
+  Plane<float> noise = c.pt().variance[1];
+  for (int x = 0; x < noise.width; ++x) noise.at(x, 11) *= 20;
+  noise.at(3, 2) = 0;
+  for (const LevelOf of : {LevelOf::Window, LevelOf::AlikeInNoise}) {
+    const Plane<double> unit = squareUnits(a, b, noise, of);
+    for (const auto& [px, py] : {std::pair{20, 12}, {20, 11}, {0, 0}, {3, 2}, {a.width - 1, a.height - 1}}) {
+      double sum = 0, count = 0;
+      for (int v = py - 3; v <= py + 3; ++v)
+        for (int u = px - 3; u <= px + 3; ++u) {
+          const int x = mirrorIndex(u, a.width), y = mirrorIndex(v, a.height);
+          const float own = noise.at(px, py), other = noise.at(x, y);
+          if (of == LevelOf::AlikeInNoise && std::max(own, other) > 8 * std::min(own, other)) continue;
+          sum += 0.5 * (std::sqrt(std::max(0.0, static_cast<double>(a.at(x, y)))) +
+                        std::sqrt(std::max(0.0, static_cast<double>(b.at(x, y)))));
+          ++count;
+        }
+      const double level = sqr(sum / count), epsilon = 1e-6 * planeMean(noise);
+      CHECK(unit.at(px, py) ==
+            doctest::Approx(std::sqrt((static_cast<double>(noise.at(px, py)) + epsilon) * (level * level + 0.01)))
+                .epsilon(1e-5));
+    }
+  }
+}
+
+// The combination mends a lamp that half A has met more often than half B, and puts noise into the dark around it.
+TEST_CASE("What a lamp gains does not speak for the dark beside it") {
+  CaseOptions o;
+  o.width = o.height = 64;
+  o.constant = 0.1;
+  Case c = makeCase(o);
+  Estimate& y = c.estimates.estimates[0];
+  Rgb<float> noise = y.variance, combined[2] = {c.truth, c.truth};
+  for (size_t k = 0; k < 3; ++k) {
+    for (int v = 30; v < 34; ++v)
+      for (int u = 30; u < 34; ++u) {
+        y.mean[k].at(u, v) = 100;
+        y.half[0][k].at(u, v) = 150;
+        y.half[1][k].at(u, v) = 50;
+        noise[k].at(u, v) = 2500;
+        combined[0][k].at(u, v) = combined[1][k].at(u, v) = 100;
+      }
+    for (int v = 26; v < 38; ++v)
+      for (int u = 26; u < 38; ++u)
+        if (y.mean[k].at(u, v) < 50) {
+          combined[0][k].at(u, v) += 0.15f;
+          combined[1][k].at(u, v) -= 0.15f;
+        }
+  }
+  const auto share = combinedShares(y, y.mean, combined, noise);
+  for (size_t k = 0; k < 3; ++k) CHECK(share[k].at(28, 28) < 0.2f);
 }
 
 // One sample of half A of the independent image carries all the light of a pixel; its neighbours take their parts.
