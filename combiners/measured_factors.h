@@ -14,8 +14,16 @@ namespace braid {
 //   f = Σ u (x^A - y^A) (x^B - y^A) / Σ u (x^A - y^A)²,
 // 0 where X and Y agree. u is one over squareUnits() of both images and of usualVariance() of x, if it has a variance.
 // The noise of a half is larger than that of the whole, hence f is rather too small, and James and Stein's factor
-// larger, unless Y's errors are those of X. Pixels with a positive `gate` count for nothing; it may be empty.
+// larger, unless Y's errors are those of X. Pixels with a positive `gate` count for nothing, or, with Gated::Only, no
+// others do: 0 where there are none. It may be empty.
+enum class Gated { Not, Only };
 std::array<Plane<float>, 3> measuredFactors(const Estimate& x, const Rgb<float> (&y)[2], const Plane<float>& gate,
-                                            int radius);
+                                            int radius, Gated pixels = Gated::Not);
+
+// How much of X to keep in pixels with a positive `gate`: the product of what they alone measure in the 3x3 pixels
+// around and in the block. A lamp's mirror image agrees with itself near and far; two strong samples that fell into
+// both halves of one pixel do so near at most, and where strong samples are dense, single ones speak against them.
+std::array<Plane<float>, 3> measuredOutlierFactors(const Estimate& x, const Rgb<float> (&y)[2],
+                                                   const Plane<float>& gate, int radius);
 
 }  // namespace braid

@@ -252,17 +252,18 @@ ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rg
 }
 
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale& scale, const Rgb<float>& y,
-                       const JamesSteinSettings& settings, const std::array<Plane<float>, 3>* least) {
+                       const JamesSteinSettings& settings, const LeastFactors* least) {
   BRAID_ASSERT(!least || !settings.global);
   ShrunkImage out;
   out.image = Rgb<float>(x.width(), x.height(), kUnfilled);
   const size_t together = settings.shared ? 3 : 1;
   for (size_t first = 0; first < 3; first += together) {
     Plane<float> factor =
-        factors(termsOf(x, variance, scale, y, first, together), settings, least ? &(*least)[first] : nullptr);
+        factors(termsOf(x, variance, scale, y, first, together), settings, least ? &least->blocks[first] : nullptr);
+    const Plane<float>* const ofOutliers = least && !least->outliers[first].empty() ? &least->outliers[first] : nullptr;
     parallelChunks(x.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i)
-        if (isLoneOutlier(scale.gate, x, y, i)) factor[i] = 0;
+        if (isLoneOutlier(scale.gate, x, y, i)) factor[i] = ofOutliers ? (*ofOutliers)[i] : 0;
       for (size_t c = first; c < first + together; ++c)
         runVectorised([&] { blendRow(&x[c][begin], &y[c][begin], &factor[begin], end - begin, &out.image[c][begin]); });
     });

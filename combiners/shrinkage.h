@@ -76,9 +76,15 @@ struct ShrunkImage {
 // x, y: images; variance: of the mean of x, >= 0. All of one size.
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rgb<float>& y,
                        const JamesSteinSettings& settings);
-// The same with the scale of these settings and this variance. The factors of blocks are not below `least`, by channel;
-// null: 0. It must be null for one factor for the whole image.
+// What of X to keep whatever its noise says, by channel (combiners/measured_factors.h).
+struct LeastFactors {
+  std::array<Plane<float>, 3> blocks;    // the factors of blocks are not below it
+  std::array<Plane<float>, 3> outliers;  // the factor of lone outliers; or empty: they are replaced
+};
+
+// The same with the scale of these settings and this variance. `least` may be null: 0. It must be null for one factor
+// for the whole image.
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale& scale, const Rgb<float>& y,
-                       const JamesSteinSettings& settings, const std::array<Plane<float>, 3>* least = nullptr);
+                       const JamesSteinSettings& settings, const LeastFactors* least = nullptr);
 
 }  // namespace braid

@@ -72,6 +72,35 @@ TEST_CASE("Gated pixels count for nothing, and a lamp does not hide what is wron
   CHECK(measuredFactors(n, wrong, {}, 7)[0].at(13, 16) > 0.5f);
 }
 
+TEST_CASE("Outliers are kept where halves agree on them near and in the block") {
+  constexpr int kSize = 32;
+  Estimate x;
+  Plane<float> gate(kSize, kSize);
+  for (Rgb<float>* image : {&x.mean, &x.half[0], &x.half[1]}) *image = Rgb<float>(kSize, kSize);
+  const Rgb<float> black[2] = {x.mean, x.mean};
+  const auto set = [&](int u, int v, float a, float b) {
+    gate.at(u, v) = 1;
+    for (size_t c = 0; c < 3; ++c) {
+      x.half[0][c].at(u, v) = a;
+      x.half[1][c].at(u, v) = b;
+      x.mean[c].at(u, v) = 0.5f * (a + b);
+    }
+  };
+  for (int v = 4; v < 12; ++v) set(4, v, 30, 24);  // a lamp's mirror image, one pixel wide
+  for (int v = 20; v < 32; v += 2)                 // strong samples, one to a pixel, but for one pixel with two
+    for (int u = 18; u < 32; u += 4) set(u, v, v == 26 ? 40.0f : 0.0f, v == 26 ? 0.0f : 40.0f);
+  set(22, 26, 40, 40);
+  const auto factors = measuredOutlierFactors(x, black, gate, 7);
+  for (size_t c = 0; c < 3; ++c) {
+    CHECK(factors[c].at(4, 8) > 0.9f);
+    CHECK(factors[c].at(22, 26) < 0.25f);
+    CHECK(factors[c].at(18, 24) == 0);
+    CHECK(factors[c].at(31, 2) == 0);  // no outlier near
+  }
+  CHECK(measuredFactors(x, black, gate, 1, Gated::Only)[0].at(22, 26) == 1);
+  CHECK(measuredFactors(x, black, gate, 1)[0].at(4, 8) == 0);
+}
+
 TEST_CASE("Noise that a biased image has of the unbiased one hides less of its error from measured factors") {
   // Half the noise of X beside an error of its own: (X - Y)² is small, and the paper's factor with it.
   CaseOptions o;
