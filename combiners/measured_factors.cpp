@@ -19,34 +19,49 @@ Plane<double> unitsOf(const Estimate& x, const Rgb<float> (&y)[2], size_t c) {
   return squareUnits(x.mean[c], mean, x.variance.empty() ? Plane<float>() : usualVariance(x.variance[c]));
 }
 
+// Of the pixels that count, by pixel: numerator and denominator of the factor; 0 in the others.
+struct Terms {
+  Plane<double> products, squares;
+};
+
+Terms termsOf(const Estimate& x, const Rgb<float> (&y)[2], const Plane<float>& gate, Gated pixels, size_t c) {
+  const Plane<double> unit = unitsOf(x, y, c);
+  Terms out{Plane<double>(x.mean.width(), x.mean.height()), Plane<double>(x.mean.width(), x.mean.height())};
+  parallelChunks(unit.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      if ((!gate.empty() && gate[i] > 0) != (pixels == Gated::Only)) continue;
+      const auto xa = static_cast<double>(x.half[0][c][i]), xb = static_cast<double>(x.half[1][c][i]);
+      const auto ya = static_cast<double>(y[0][c][i]), yb = static_cast<double>(y[1][c][i]);
+      out.products[i] = ((xa - ya) * (xb - ya) + (xb - yb) * (xa - yb)) / unit[i];
+      out.squares[i] = (sqr(xa - ya) + sqr(xb - yb)) / unit[i];
+    }
+  });
+  return out;
+}
+
 }  // namespace
 
 std::array<Plane<float>, 3> measuredFactors(const Estimate& x, const Rgb<float> (&y)[2], const Plane<float>& gate,
                                             int radius, Gated pixels) {
   std::array<Plane<float>, 3> out;
   for (size_t c = 0; c < 3; ++c) {
-    const Plane<double> unit = unitsOf(x, y, c);
-    Plane<double> products(x.mean.width(), x.mean.height()), squares(x.mean.width(), x.mean.height());
-    parallelChunks(products.size(), kPixelChunk, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) {
-        if ((!gate.empty() && gate[i] > 0) != (pixels == Gated::Only)) continue;
-        const auto xa = static_cast<double>(x.half[0][c][i]), xb = static_cast<double>(x.half[1][c][i]);
-        const auto ya = static_cast<double>(y[0][c][i]), yb = static_cast<double>(y[1][c][i]);
-        products[i] = ((xa - ya) * (xb - ya) + (xb - yb) * (xa - yb)) / unit[i];
-        squares[i] = (sqr(xa - ya) + sqr(xb - yb)) / unit[i];
-      }
-    });
-    out[c] = windowRatio(std::move(products), std::move(squares), radius, 0);
+    Terms terms = termsOf(x, y, gate, pixels, c);
+    out[c] = windowRatio(std::move(terms.products), std::move(terms.squares), radius, 0);
   }
   return out;
 }
 
 std::array<Plane<float>, 3> measuredOutlierFactors(const Estimate& x, const Rgb<float> (&y)[2],
                                                    const Plane<float>& gate, int radius) {
-  std::array<Plane<float>, 3> out = measuredFactors(x, y, gate, 1, Gated::Only);
-  const std::array<Plane<float>, 3> block = measuredFactors(x, y, gate, radius, Gated::Only);
-  for (size_t c = 0; c < 3; ++c)
-    for (size_t i = 0; i < out[c].size(); ++i) out[c][i] *= block[c][i];
+  std::array<Plane<float>, 3> out;
+  for (size_t c = 0; c < 3; ++c) {
+    Terms terms = termsOf(x, y, gate, Gated::Only, c);
+    out[c] = windowRatio(terms.products, terms.squares, 1, 0);
+    const Plane<float> block = windowRatio(std::move(terms.products), std::move(terms.squares), radius, 0);
+    parallelChunks(block.size(), kPixelChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) out[c][i] *= block[i];
+    });
+  }
   return out;
 }
 

@@ -9,14 +9,15 @@
 
 namespace braid {
 
+// Which pixels count: those without a positive gate, or those with one.
+enum class Gated { Not, Only };
+
 // For every channel and the block of (2 radius + 1)² pixels, mirrored at the borders, around every pixel, the f in
 // [0, 1] that minimises Σ u (y^A + f (x^A - y^A) - x^B)² plus the same with the halves exchanged:
 //   f = Σ u (x^A - y^A) (x^B - y^A) / Σ u (x^A - y^A)²,
 // 0 where X and Y agree. u is one over squareUnits() of both images and of usualVariance() of x, if it has a variance.
 // The noise of a half is larger than that of the whole, hence f is rather too small, and James and Stein's factor
-// larger, unless Y's errors are those of X. Pixels with a positive `gate` count for nothing, or, with Gated::Only, no
-// others do: 0 where there are none. It may be empty.
-enum class Gated { Not, Only };
+// larger, unless Y's errors are those of X. 0 where none of the `pixels` of `gate` is in the block; it may be empty.
 std::array<Plane<float>, 3> measuredFactors(const Estimate& x, const Rgb<float> (&y)[2], const Plane<float>& gate,
                                             int radius, Gated pixels = Gated::Not);
 

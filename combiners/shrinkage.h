@@ -76,6 +76,7 @@ struct ShrunkImage {
 // x, y: images; variance: of the mean of x, >= 0. All of one size.
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rgb<float>& y,
                        const JamesSteinSettings& settings);
+
 // What of X to keep whatever its noise says, by channel (combiners/measured_factors.h).
 struct LeastFactors {
   std::array<Plane<float>, 3> blocks;    // the factors of blocks are not below it

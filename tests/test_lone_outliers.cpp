@@ -22,8 +22,8 @@ double reflection(int x, int y) {
   return 0.02 + 2 * std::exp(-(dx * dx + dy * dy) / (2 * 2.0 * 2.0));
 }
 
-// It with noise in proportion to its brightness.
-Estimate noisyReflection(double relativeDeviation, unsigned seed) {
+// A picture with noise in proportion to its brightness.
+Estimate noisy(double (*picture)(int, int), double relativeDeviation, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   Estimate e;
@@ -31,7 +31,7 @@ Estimate noisyReflection(double relativeDeviation, unsigned seed) {
   e.mean = e.half[0] = e.half[1] = e.variance = Rgb<float>(kWidth, kHeight);
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) {
-      const double value = reflection(x, y), deviation = relativeDeviation * value;
+      const double value = picture(x, y), deviation = relativeDeviation * value;
       const double noise[2] = {normal(random), normal(random)};
       for (size_t c = 0; c < 3; ++c) {
         for (size_t h = 0; h < 2; ++h)
@@ -111,14 +111,14 @@ TEST_CASE("A glossy reflection is not replaced by what a filter has made of it")
   // Its pixels deviate by 16 to 40 %, far more than the black around them, and by less than three deviations from
   // the filter: shrinkage towards a box must not be worse than what it shrinks.
   for (const double deviation : {0.16, 0.25, 0.4}) {
-    const Estimate x = noisyReflection(deviation, 1);
+    const Estimate x = noisy(reflection, deviation, 1);
     CAPTURE(deviation);
     CHECK(errorsOf(shrunkTowards(boxOf(x), x).image.mean).square < 1.02 * errorsOf(x.mean).square);
   }
 }
 
 TEST_CASE("What is told of the error beside a bright reflection is in proportion to the image, not to the filter's") {
-  const Estimate x = noisyReflection(0.2, 2);
+  const Estimate x = noisy(reflection, 0.2, 2);
   const MethodResult result = shrunkTowards(boxOf(x), x);
   double told = 0;
   for (size_t i = 0; i < result.error.size(); ++i)
@@ -129,23 +129,8 @@ TEST_CASE("What is told of the error beside a bright reflection is in proportion
 }
 
 TEST_CASE("A mirror image one pixel wide is not replaced by what a filter has made of it") {
-  Estimate x;
-  x.passes = 64;
-  x.mean = x.half[0] = x.half[1] = x.variance = Rgb<float>(kWidth, kHeight);
-  std::mt19937 random(5);
-  std::normal_distribution<double> normal;
-  const auto truth = [](int u, int v) { return u == 40 && v > 20 && v < 30 ? 30.0 : 0.05; };
-  for (int v = 0; v < kHeight; ++v)
-    for (int u = 0; u < kWidth; ++u) {
-      const double value = truth(u, v), deviation = 0.4 * value;
-      const double noise[2] = {normal(random), normal(random)};
-      for (size_t c = 0; c < 3; ++c) {
-        for (size_t h = 0; h < 2; ++h)
-          x.half[h][c].at(u, v) = static_cast<float>(value + std::sqrt(2.0) * deviation * noise[h]);
-        x.mean[c].at(u, v) = 0.5f * (x.half[0][c].at(u, v) + x.half[1][c].at(u, v));
-        x.variance[c].at(u, v) = static_cast<float>(deviation * deviation);
-      }
-    }
+  const auto mirrorImage = [](int x, int y) { return x == 40 && y > 20 && y < 30 ? 30.0 : 0.05; };
+  const Estimate x = noisy(mirrorImage, 0.4, 5);
   const Estimate box = boxOf(x);
   const Rgb<float> image = shrunkTowards(box, x).image.mean;
   const Plane<float> gate = outlierGate(x.variance, kGateRadius);
