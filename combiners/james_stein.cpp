@@ -15,8 +15,8 @@
 //   - The factor is never below the one that the halves measure (js-measured; measured_factors.h): on glossy
 //     plates, towards box, 0.84 of the unbiased image's error at 32 samples instead of 3.7, 0.91 at 128 instead
 //     of 2.2. Lone outliers have a factor of their own: a lamp's mirror image agrees with itself in both halves, where
-//     it was replaced; on the plates 0.98 at 64 and at 128 samples instead of 1.10 and 1.09, 0.98 of before on 14
-//     scenes.
+//     it was replaced, and so do its neighbours; on the plates 0.98 at 64 and at 128 samples instead of 1.10 and 1.09,
+//     0.99 of before on 14 scenes at 8, 32 and 128.
 //   - Halves that a denoiser filtered with the weights of all samples hide their noise from all of the above. Where the
 //     quarters allow it, it is run again on each half by itself (js-own-halves): towards rdfc, which that takes twice
 //     more, 0.95 of the unbiased image's error on leaves at 128 samples instead of 1.03, and 0.98 of before on 14

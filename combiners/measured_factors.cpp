@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "combiners/measured_factors.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "combiners/finite_float.h"
 #include "combiners/shrinkage.h"
 #include "combiners/square_units.h"
 #include "combiners/window_ratio.h"
@@ -39,6 +41,20 @@ Terms termsOf(const Estimate& x, const Rgb<float> (&y)[2], const Plane<float>& g
   return out;
 }
 
+// What the 3x3 pixels around (x, y) measure with it or without it, whichever is less: 0 where it is alone.
+float nearFactor(const Terms& terms, int x, int y) {
+  double products = 0, squares = 0;  // of the neighbours in the image
+  for (int v = std::max(0, y - 1); v <= std::min(terms.squares.height - 1, y + 1); ++v)
+    for (int u = std::max(0, x - 1); u <= std::min(terms.squares.width - 1, x + 1); ++u) {
+      if (u == x && v == y) continue;
+      products += terms.products.at(u, v);
+      squares += terms.squares.at(u, v);
+    }
+  if (!(squares > 0)) return 0;
+  const double all = (products + terms.products.at(x, y)) / (squares + terms.squares.at(x, y));
+  return finiteFloat(std::clamp(std::min(all, products / squares), 0.0, 1.0));
+}
+
 }  // namespace
 
 std::array<Plane<float>, 3> measuredFactors(const Estimate& x, const Rgb<float> (&y)[2], const Plane<float>& gate,
@@ -56,11 +72,13 @@ std::array<Plane<float>, 3> measuredOutlierFactors(const Estimate& x, const Rgb<
   std::array<Plane<float>, 3> out;
   for (size_t c = 0; c < 3; ++c) {
     Terms terms = termsOf(x, y, gate, Gated::Only, c);
-    out[c] = windowRatio(terms.products, terms.squares, 1, 0);
-    const Plane<float> block = windowRatio(std::move(terms.products), std::move(terms.squares), radius, 0);
-    parallelChunks(block.size(), kPixelChunk, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) out[c][i] *= block[i];
+    Plane<float>& factors = out[c] = Plane<float>(gate.width, gate.height);
+    parallelRows(gate.height, [&](int row) {
+      for (int column = 0; column < gate.width; ++column)
+        if (gate.at(column, row) > 0) factors.at(column, row) = nearFactor(terms, column, row);
     });
+    const Plane<float> block = windowRatio(std::move(terms.products), std::move(terms.squares), radius, 0);
+    for (size_t i = 0; i < block.size(); ++i) factors[i] *= block[i];
   }
   return out;
 }

@@ -21,9 +21,10 @@ enum class Gated { Not, Only };
 std::array<Plane<float>, 3> measuredFactors(const Estimate& x, const Rgb<float> (&y)[2], const Plane<float>& gate,
                                             int radius, Gated pixels = Gated::Not);
 
-// How much of X to keep in pixels with a positive `gate`: the product of what they alone measure in the 3x3 pixels
-// around and in the block. A lamp's mirror image agrees with itself near and far; two strong samples that fell into
-// both halves of one pixel do so near at most, and where strong samples are dense, single ones speak against them.
+// How much of X to keep in pixels with a positive `gate`, 0 in the others: of what gated pixels measure, that of the
+// 3x3 pixels around, with the pixel itself or without it, whichever is less, times that of the block. A lamp's mirror
+// image agrees with itself near and far; two strong samples that fell into both halves of one pixel have no neighbours
+// that do, and where strong samples are dense, single ones speak against them.
 std::array<Plane<float>, 3> measuredOutlierFactors(const Estimate& x, const Rgb<float> (&y)[2],
                                                    const Plane<float>& gate, int radius);
 

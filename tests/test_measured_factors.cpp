@@ -90,11 +90,13 @@ TEST_CASE("Outliers are kept where halves agree on them near and in the block") 
   for (int v = 20; v < 32; v += 2)                 // strong samples, one to a pixel, but for one pixel with two
     for (int u = 18; u < 32; u += 4) set(u, v, v == 26 ? 40.0f : 0.0f, v == 26 ? 0.0f : 40.0f);
   set(22, 26, 40, 40);
+  set(28, 4, 40, 40);  // alone in its block
   const auto factors = measuredOutlierFactors(x, black, gate, 7);
   for (size_t c = 0; c < 3; ++c) {
     CHECK(factors[c].at(4, 8) > 0.9f);
-    CHECK(factors[c].at(22, 26) < 0.25f);
+    CHECK(factors[c].at(22, 26) == 0);
     CHECK(factors[c].at(18, 24) == 0);
+    CHECK(factors[c].at(28, 4) == 0);
     CHECK(factors[c].at(31, 2) == 0);  // no outlier near
   }
   CHECK(measuredFactors(x, black, gate, 1, Gated::Only)[0].at(22, 26) == 1);
