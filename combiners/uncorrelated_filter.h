@@ -12,8 +12,9 @@
 // Pairs of pixels of which one is much more uncertain than the other (a lamp's mirror image beside the dark) are left
 // out, k_i = 0: a 224th of the one's error may be many times the other's own. Left out for both, they change no mean of
 // the image: left out for one, up to 8 % of the light went where rare strong samples make the variance (glass of water
-// at 16 samples). At 224 times the variance, plates have at most 4.9 times the error of the better input instead of
-// 23; at 30 times less, but caustics, whose pixels are as uncertain, stay noisy.
+// at 16 samples). Few neighbours keep glossy reflections of lamps from harm, many find caustics, whose pixels are as
+// uncertain: with pairs of up to 224, 100 and 30 times the variance plates at 16 samples have 1.33, 0.97 and 0.60 times
+// the error of the better input, glass of water 0.04, 0.16 and 0.18 times, and up to 20 times more in single runs.
 #pragma once
 
 #include <array>

@@ -106,7 +106,7 @@ Rgb<float> priorOf(const MethodResult& r) {
 }
 
 // y + Σ k_i (g_c - g_i) with k_i >= 0, Σ k_i <= 1 and g = z - y: the limits of unbiased differences. They are no hull
-// of the inputs, and may be negative.
+// of the inputs, and may be negative. `uncorrelated` mixes in y + w g_c, w in [0, 1].
 std::string beyondDifferences(const Rgb<float>& out, const Rgb<float>& y, const Rgb<float>& z) {
   for (size_t c = 0; c < 3; ++c) {
     double least = HUGE_VAL, most = -HUGE_VAL;
@@ -117,7 +117,7 @@ std::string beyondDifferences(const Rgb<float>& out, const Rgb<float>& y, const 
     for (size_t i = 0; i < y.size(); ++i) {
       const double g = value(z, c, i) - value(y, c, i), v = value(out, c, i) - value(y, c, i);
       const double rounding = kRounding * std::max({std::fabs(least), std::fabs(most), std::fabs(value(y, c, i))});
-      if (v < std::min(0.0, g - most) - rounding || v > std::max(0.0, g - least) + rounding)
+      if (v < std::min({0.0, g, g - most}) - rounding || v > std::max({0.0, g, g - least}) + rounding)
         return "change of " + std::to_string(v) + " at " + std::to_string(i);
     }
   }

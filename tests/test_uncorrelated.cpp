@@ -161,33 +161,41 @@ TEST_CASE("The scores are the variance of what the candidates make, and the lowe
 }
 
 TEST_CASE("The methods: less noise than their input, halves, error, and a gamma of the list") {
+  constexpr int kRuns = 8;
+  double noisy = 0, errors[3] = {0, 0, 0}, estimated[3] = {0, 0, 0};
   CaseOptions o;
   o.width = 96;
   o.height = 72;
   o.samples = 64;
-  const Case c = makeCase(o);
-  const MethodInputs in = inputsOf(c);
-  const double noisy = meanSquaredError(c.pt().mean, c.truth);
-  double errors[3];
-  size_t k = 0;
-  for (const auto& m : {make_uncorrelated(), make_uncorrelated_cross(), make_uncorrelated_uniform()}) {
-    const MethodResult r = m->run(in);
-    CAPTURE(std::string(m->name()));
-    const double error = errors[k++] = meanSquaredError(r.image.mean, c.truth);
-    double estimated = 0;
-    for (const float e : r.error.data) estimated += static_cast<double>(e) / static_cast<double>(r.error.size());
-    MESSAGE(std::string(m->name()), ": error ", error, " of ", noisy, ", estimated ", estimated);
-    CHECK(estimated > 0.4 * error);
-    CHECK(estimated < 2.5 * error);
-    CHECK_FALSE(r.image.half[1].empty());
-    if (!r.remarks.empty()) {
+  for (int run = 0; run < kRuns; ++run) {
+    o.seed = 1 + static_cast<uint64_t>(run);
+    const Case c = makeCase(o);
+    noisy += meanSquaredError(c.pt().mean, c.truth) / kRuns;
+    size_t k = 0;
+    for (const auto& m : {make_uncorrelated(), make_uncorrelated_cross(), make_uncorrelated_uniform()}) {
+      const MethodResult r = m->run(inputsOf(c));
+      CAPTURE(std::string(m->name()));
+      errors[k] += meanSquaredError(r.image.mean, c.truth) / kRuns;
+      for (const float e : r.error.data)
+        estimated[k] += static_cast<double>(e) / static_cast<double>(r.error.size()) / kRuns;
+      ++k;
+      CHECK_FALSE(r.image.half[1].empty());
+      if (r.remarks.empty()) continue;
       bool listed = false;
       for (const float g : kUncorrelatedGammas) listed = listed || r.remarks[0].number == static_cast<double>(g);
       CHECK(listed);
     }
   }
+  for (size_t k = 0; k < 3; ++k) {
+    MESSAGE("method ", k, ": error ", errors[k], " of ", noisy, ", estimated ", estimated[k]);
+    CHECK(estimated[k] > 0.5 * errors[k]);
+    CHECK(estimated[k] < 2 * errors[k]);
+  }
   CHECK(errors[0] < 0.5 * noisy);
-  CHECK(errors[0] < errors[2]);
+  // The noise of the correlated image is common to whole regions: uniform weights are the best there are.
+  CHECK(errors[0] < 1.05 * errors[2]);
+  const Case c = makeCase(o);
+  const MethodInputs in = inputsOf(c);
   MethodInputs fixed = in;
   fixed.options.set("uncorrelated-gamma", 0.7);
   CHECK(make_uncorrelated()->run(fixed).remarks[0].number == 0.7);
