@@ -36,7 +36,7 @@ class BidirectionalPathTracer final : public Integrator {
   }
   bool splats() const override { return true; }
   Applies applies(const SceneTraits& traits, const LightReach& reach) const override {
-    return lightSubpathsApply(traits, reach);
+    return connectionsApply(traits, reach);
   }
   std::shared_ptr<const Preparation> prepare(const TransportContext& context, const Plan&) const override {
     return std::make_shared<LightPreparation>(context);

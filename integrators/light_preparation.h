@@ -24,7 +24,11 @@ struct LightPreparation : Preparation {
   };
 };
 
-// Whether light subpaths find light that camera paths find by rare chance only: caustics, or lights behind a gap.
-Applies lightSubpathsApply(const SceneTraits& traits, const LightReach& reach);
+// Whether photons find light that camera paths find by rare chance only: caustics, or lights behind a gap.
+Applies photonsApply(const SceneTraits& traits, const LightReach& reach);
+
+// Whether light subpaths are worth connecting to camera paths beside a photon map, instead of camera paths alone: where
+// caustics are much of the light in view, or none that a camera path can find.
+Applies connectionsApply(const SceneTraits& traits, const LightReach& reach);
 
 }  // namespace braid

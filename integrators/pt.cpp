@@ -18,7 +18,7 @@ class PathTracer final : public Integrator {
     return "path tracing, next-event estimation and BSDF sampling with the power heuristic";
   }
   Applies applies(const SceneTraits& traits, const LightReach& reach) const override {
-    if (lightSubpathsApply(traits, reach).yes) return {false, "bdpt has all its ways to find light, and more"};
+    if (connectionsApply(traits, reach).yes) return {false, "bdpt has all its ways to find light, and more"};
     return {true, "unbiased for every scene"};
   }
 

@@ -27,7 +27,7 @@ class PhotonMapper final : public Integrator {
   bool unbiased() const override { return false; }
   bool estimatesBias() const override { return true; }
   Applies applies(const SceneTraits& traits, const LightReach& reach) const override {
-    return lightSubpathsApply(traits, reach);
+    return photonsApply(traits, reach);
   }
 
   WorkingMemory workingMemory(const Plan& plan) const override {

@@ -2,6 +2,7 @@
 // Which integrators `auto` keeps: measured, with a reason for every one that is left out.
 #include <doctest/doctest.h>
 
+#include "integrators/light_preparation.h"
 #include "renderer/scene/gltf.h"
 #include "tests/render_fixture.h"
 
@@ -38,11 +39,42 @@ TEST_CASE("auto leaves photons and light subpaths out where camera paths find al
   }
 }
 
-TEST_CASE("auto keeps photons and light subpaths for caustics of small lamps and for hidden lights") {
-  for (const char* name : {"pool", "torus_glass", "glass_of_water", "materials", "door_ajar", "many_lights"}) {
+TEST_CASE("auto keeps photons and connections where caustics are much of the light, or come from lights without size") {
+  for (const char* name : {"pool", "torus_glass", "glass_of_water", "materials"}) {
     CAPTURE(std::string(name));
     CHECK(keptOf(name) == std::vector<std::string>{"sppm", "bdpt"});
   }
+}
+
+TEST_CASE("auto keeps photons beside camera paths for hidden lights") {
+  for (const char* name : {"door_ajar", "many_lights"}) {
+    CAPTURE(std::string(name));
+    CHECK(keptOf(name) == std::vector<std::string>{"sppm", "pt"});
+  }
+}
+
+TEST_CASE(
+    "Connections are kept for caustics that are much of the light or that no camera path finds, else photons alone") {
+  SceneTraits traits;
+  traits.flags = kTraitEmissiveTriangles;
+  LightReach reach;
+  reach.paths = 1000;
+  reach.arrivals = 100;
+  reach.lit = 0.05;
+  CHECK(photonsApply(traits, reach).yes);
+  CHECK(!connectionsApply(traits, reach).yes);
+  reach.caustic = 0.02;
+  CHECK(!connectionsApply(traits, reach).yes);
+  reach.causticVariance = 100;
+  CHECK(!connectionsApply(traits, reach).yes);
+  reach.unreachable = 0.01;
+  CHECK(connectionsApply(traits, reach).yes);
+  reach.unreachable = 0;
+  reach.caustic = 0.07;
+  CHECK(connectionsApply(traits, reach).yes);
+  reach = LightReach();
+  CHECK(!photonsApply(traits, reach).yes);
+  CHECK(!connectionsApply(traits, reach).yes);
 }
 
 TEST_CASE("auto renders what it keeps: the headline is the photon map's, the shares are in the plan") {

@@ -98,17 +98,21 @@ TEST_CASE("Claims hold or not by their cells, and say when nothing was measured"
                                 {"pool", "js@nfor", 16, 1, 9},
                                 {"pool", "bdpt", 16, 1, 4},
                                 {"pool", "sppm", 16, 1, 0.1},
-                                {"pool", "bdpt+sppm/auto", 16, 1, 0.12}});
-  const SweepSummary summary = summarise(t, {"room", "pool"},
-                                         {"pt", "js@nfor", "pt/auto", "bdpt", "sppm", "bdpt+sppm/auto",
-                                          "ensemble@nfor+rdfc", "ensemble-oracle@nfor+rdfc"});
+                                {"pool", "bdpt+sppm/auto", 16, 1, 0.12},
+                                {"hall", "pt", 16, 1, 0.9},
+                                {"hall", "sppm", 16, 1, 0.5},
+                                {"hall", "pt+sppm/auto", 16, 1, 0.3}});
+  const SweepSummary summary =
+      summarise(t, {"room", "pool", "hall"},
+                {"pt", "js@nfor", "pt/auto", "bdpt", "sppm", "bdpt+sppm/auto", "pt+sppm/auto", "ensemble@nfor+rdfc",
+                 "ensemble-oracle@nfor+rdfc"});
   CHECK(knowsPapers(summary));
   CHECK(!knowsPapers(summarise(t, {"room"}, {"pt"})));
   const std::vector<ReplicateBias> biases{{"room", "uncorrelated", 2, 1e-5, 1e-6, 1e-3},
                                           {"room", "nfor", 2, 1e-3, 1e-6, 1e-3},
                                           {"pool", "uncorrelated", 2, 1e-2, 1e-1, 1},
                                           {"pool", "nfor", 2, 1e-2, 1e-1, 1}};
-  const auto sections = comparePapers(t, summary, biases, {{"room", "pt"}, {"pool", "sppm+bdpt"}});
+  const auto sections = comparePapers(t, summary, biases, {{"room", "pt"}, {"pool", "sppm+bdpt"}, {"hall", "sppm+pt"}});
   REQUIRE(sections.size() == 6);
   const PaperClaim* js = findClaim(sections, "Shrinking towards nfor never");
   REQUIRE(js);
@@ -118,8 +122,11 @@ TEST_CASE("Claims hold or not by their cells, and say when nothing was measured"
   // auto's inputs are those that the plan keeps: on pool its error is 1.2 times sppm's.
   const PaperClaim* best = findClaim(sections, "error of its best integrator");
   REQUIRE(best);
-  CHECK(best->measured.find("1 of 2 cells") == 0);
+  CHECK(best->measured.find("2 of 3 cells") == 0);
   CHECK(best->holds == false);
+  const PaperClaim* photons = findClaim(sections, "scenes with photon maps");
+  REQUIRE(photons);
+  CHECK(photons->measured.find("over 2 scenes; least 3x (hall)") != std::string::npos);
   const PaperClaim* gain = findClaim(sections, "scenes of path tracing alone");
   REQUIRE(gain);
   CHECK(gain->measured.find("4x less error over 1 scenes") == 0);
@@ -127,7 +134,7 @@ TEST_CASE("Claims hold or not by their cells, and say when nothing was measured"
   const PaperClaim* error = findClaim(sections, "error that it tells of itself");
   REQUIRE(error);
   CHECK(error->holds == true);
-  CHECK(error->measured.find("2 of 2 runs") == 0);
+  CHECK(error->measured.find("3 of 3 runs") == 0);
   // Only the room resolves a twentieth of nfor's squared bias.
   const PaperClaim* bias = findClaim(sections, "Negligible bias");
   REQUIRE(bias);

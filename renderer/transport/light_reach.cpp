@@ -141,8 +141,8 @@ LightReach measureLightReach(const TransportContext& context, const Camera& came
       reach.direct += value;
     } else if (state.leastPdfW > kFocusingPdf) {
       reach.caustic += value;
-      // Points and directions cannot be hit at all.
       const bool lamp = state.light < context.lights.firstPositional();
+      if (!lamp) reach.unreachable += value;
       reach.causticVariance +=
           value / chanceToHit(lamp ? areas.at(scene.emitters()[state.light].mesh) : 0, state.travelled);
     } else {
@@ -171,7 +171,8 @@ LightReach measureLightReach(const TransportContext& context, const Camera& came
   }
   reach.paths = kPaths;
   if (total > 0)
-    for (double* share : {&reach.direct, &reach.indirect, &reach.caustic, &reach.causticVariance}) *share /= total;
+    for (double* share : {&reach.direct, &reach.indirect, &reach.caustic, &reach.causticVariance, &reach.unreachable})
+      *share /= total;
   return reach;
 }
 

@@ -19,6 +19,7 @@ struct LightReach {
   // Relative variance that caustics give to one camera path which can only find them by chance: Σ share / probability
   // of hitting the light over the focusing surface. 1 is as bad as a signal that one path in two sees.
   double causticVariance = 0;
+  double unreachable = 0;  // of the caustics: from points and directions, which no camera path can hit
   // Share of the camera's view of rough surfaces from where one light sample finds a light unhidden.
   double lit = 0;
 };

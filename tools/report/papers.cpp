@@ -23,9 +23,19 @@ constexpr const char *kCurves = "curves@nfor", *kEasy = "easy@nfor", *kInverse =
                      *kIdeal = "ideal@nfor";
 constexpr const char* kStopped = "curves:32@nfor";
 constexpr double kStop = 32;
-constexpr const char *kAuto = "pt/auto", *kAutoPhotons = "bdpt+sppm/auto";
+// auto with what a plan may keep, and the integrators that it combines.
+struct AutoCase {
+  const char* method;
+  std::vector<std::string> inputs;
+};
+const AutoCase kAuto{"pt/auto", {"pt"}}, kAutoPhotons{"pt+sppm/auto", {"pt", "sppm"}},
+    kAutoCaustics{"bdpt+sppm/auto", {"bdpt", "sppm"}};
 const std::vector<std::string> kOneHots{"one-hot-sbf@nfor+rdfc", "one-hot-nfor@nfor+rdfc", "one-hot-post@nfor+rdfc"};
 const std::vector<std::string> kShrunk{"box", "nfor", "rdfc", "sppm"};
+
+void add(const CellComparison& some, CellComparison& all) {
+  all.cells.insert(all.cells.end(), some.cells.begin(), some.cells.end());
+}
 
 std::string shrunk(const std::string& biased) { return biased == "sppm" ? "pt/js@sppm" : "js@" + biased; }
 
@@ -52,17 +62,23 @@ class Comparison {
   static PaperClaim figure(const std::string& text, const CellComparison& c);
   PaperClaim biasClaim() const;
   CellComparison sinceStop() const;
-  bool keepsPhotons(const std::string& scene) const {
+  bool keeps(const std::string& scene, const char* integrator) const {
     const auto found = planned_.find(scene);
-    return found != planned_.end() && found->second.find("sppm") != std::string::npos;
+    return found != planned_.end() && found->second.find(integrator) != std::string::npos;
+  }
+  bool keepsPhotons(const std::string& scene) const { return keeps(scene, "sppm"); }
+  const AutoCase& autoCase(const std::string& scene) const {
+    return !keepsPhotons(scene) ? kAuto : keeps(scene, "bdpt") ? kAutoCaustics : kAutoPhotons;
+  }
+  PaperCells::Keep whereAutoIs(const AutoCase& of) const {
+    return [this, &of](const std::string& s) { return &autoCase(s) == &of; };
   }
   PaperCells::Keep caustic() const {
     return [this](const std::string& s) { return keepsPhotons(s); };
   }
-  PaperCells::Keep ordinary() const {
-    return [this](const std::string& s) { return !keepsPhotons(s); };
-  }
-  PaperClaim gainClaim(const std::string& text, const char* method, const PaperCells::Keep& keep) const;
+  static PaperClaim gainClaim(const std::string& text, const CellComparison& c);
+  // auto on the scenes where the plan keeps photon maps, against another method at equal time.
+  CellComparison photonScenesAtEqualTime(const std::string& other) const;
   PaperClaim combiningShare() const;
   PaperClaim errorMapClaim() const;
 
@@ -205,8 +221,14 @@ PaperSection Comparison::curves() const {
   return s;
 }
 
-PaperClaim Comparison::gainClaim(const std::string& text, const char* method, const PaperCells::Keep& keep) const {
-  const CellComparison c = cells_.compareAtEqualTime(method, "pt", keep);
+CellComparison Comparison::photonScenesAtEqualTime(const std::string& other) const {
+  CellComparison all;
+  for (const AutoCase* of : {&kAutoPhotons, &kAutoCaustics})
+    add(cells_.compareAtEqualTime(of->method, other, whereAutoIs(*of)), all);
+  return all;
+}
+
+PaperClaim Comparison::gainClaim(const std::string& text, const CellComparison& c) {
   PaperClaim result{text, "not measured", {}};
   if (c.cells.empty()) return result;
   const CellRatio worst = c.worst();
@@ -220,7 +242,7 @@ PaperClaim Comparison::gainClaim(const std::string& text, const char* method, co
 PaperClaim Comparison::combiningShare() const {
   double total = 0, combining = 0;
   for (const SweepRow& r : table_.rows) {
-    const char* method = keepsPhotons(r.scene) ? kAutoPhotons : kAuto;
+    const char* method = autoCase(r.scene).method;
     const auto last = [&](const SweepRow& other) { return other.method == r.method && other.mark > r.mark; };
     if (r.method != method || r.ladder != Ladder::Samples || std::any_of(table_.rows.begin(), table_.rows.end(), last))
       continue;
@@ -244,7 +266,7 @@ PaperClaim Comparison::errorMapClaim() const {
   double sum = 0;
   for (const SweepRow& r : table_.rows) {
     const double ratio = r.values[told] / r.values[truth];
-    if (r.method != (keepsPhotons(r.scene) ? kAutoPhotons : kAuto) || r.mark < 16 || !(ratio > 0)) continue;
+    if (r.method != autoCase(r.scene).method || r.mark < 16 || !(ratio > 0)) continue;
     ++cells;
     held += ratio >= 0.5 && ratio <= 2;
     sum += std::log(ratio);
@@ -258,14 +280,15 @@ PaperClaim Comparison::errorMapClaim() const {
 
 PaperSection Comparison::automatic() const {
   PaperSection s{"braid's own combiner: auto, with the integrators that the plan keeps", {}};
-  CellComparison inputs = cells_.compare(kAuto, {"pt"}, 8, ordinary());
-  const CellComparison photons = cells_.compare(kAutoPhotons, {"bdpt", "sppm"}, 8, caustic());
-  inputs.cells.insert(inputs.cells.end(), photons.cells.begin(), photons.cells.end());
+  CellComparison inputs;
+  for (const AutoCase* of : {&kAuto, &kAutoPhotons, &kAutoCaustics})
+    add(cells_.compare(of->method, of->inputs, 8, whereAutoIs(*of)), inputs);
   s.claims.push_back(claim("At most 1.05x the error of its best integrator, in 95 % of the cells", inputs, 1.05, 0.95));
-  s.claims.push_back(gainClaim("Gain over pt at equal time, scenes of path tracing alone", kAuto, ordinary()));
-  s.claims.push_back(gainClaim("Gain over pt at equal time, scenes with photon maps", kAutoPhotons, caustic()));
+  s.claims.push_back(gainClaim("Gain over pt at equal time, scenes of path tracing alone",
+                               cells_.compareAtEqualTime(kAuto.method, "pt", whereAutoIs(kAuto))));
+  s.claims.push_back(gainClaim("Gain over pt at equal time, scenes with photon maps", photonScenesAtEqualTime("pt")));
   s.claims.push_back(onAverage("Less error than vertex connection and merging at equal time, scenes with photon maps",
-                               cells_.compareAtEqualTime(kAutoPhotons, "vcm", caustic()), 1.0));
+                               photonScenesAtEqualTime("vcm"), 1.0));
   s.claims.push_back(combiningShare());
   s.claims.push_back(errorMapClaim());
   return s;
@@ -279,7 +302,7 @@ std::vector<std::string> paperMethods() {
   std::vector<std::string> methods{"pt", "bdpt", "sppm", "crn", "vcm", "nfor", "rdfc", "box"};
   for (const std::string& biased : kShrunk) methods.push_back(shrunk(biased));
   for (const char* name : {kUncorrelated, kUniform, kCross, kDouble, kSingle, kEnsemble, kAverage, kOracle, kCurves,
-                           kEasy, kInverse, kStopped, kIdeal, kAuto, kAutoPhotons})
+                           kEasy, kInverse, kStopped, kIdeal, kAuto.method, kAutoPhotons.method, kAutoCaustics.method})
     methods.push_back(name);
   methods.insert(methods.end(), kOneHots.begin(), kOneHots.end());
   return methods;
