@@ -12,7 +12,8 @@ namespace braid {
 
 namespace {
 
-constexpr int kRouletteStart = 2;
+// Light subpaths are connected to much of the image: few that carry much would leave bright spots.
+constexpr Roulette kRoulette{2, 0.5f};
 // Connections that promise less than this share of what the path's connections have promised so far are decided by
 // Russian roulette: their shadow rays would cost more than they tell (Veach 1997, section 10.3.3).
 constexpr float kVisibilityThreshold = 0.1f;
@@ -32,7 +33,7 @@ WalkSettings bidirectionalWalk(const Plan& plan, Transport transport, const Merg
   s.transport = transport;
   // The last segment of a light subpath's path is the connection.
   s.maxSegments = transport == Transport::Power ? plan.settings.maxDepth - 1 : plan.settings.maxDepth;
-  s.rouletteStart = kRouletteStart;
+  s.roulette = kRoulette;
   if (merging) {
     s.connectWeight = merging->connectWeight;
     s.mergeWeight = merging->mergeWeight;

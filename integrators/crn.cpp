@@ -10,7 +10,7 @@
 // pixel is true by itself, and sub-averages are identically distributed, as the weights assume (theorem 2).
 //
 // Russian roulette with a shared variate would end whole regions of paths along a line of equal throughput: an edge
-// that is not in the scene. It therefore starts late and keeps paths at a tenth of the throughput that the path tracer
+// that is not in the scene. It therefore starts late and keeps paths at half of the throughput that the path tracer
 // keeps them at: so large is the step at such an edge, and so much less is the error that all pixels share.
 #include "integrators/path_kernel.h"
 #include "integrators/registry.h"

@@ -2,7 +2,6 @@
 #include "integrators/gdpt_kernel.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "renderer/core/error.h"
 
@@ -10,7 +9,6 @@ namespace braid {
 
 namespace {
 
-constexpr int kNever = std::numeric_limits<int>::max();
 constexpr int kMaxNullCrossings = 256;
 // Perceptual roughness from which a surface counts as rough: below it, the lobe is too narrow for a direction that was
 // not sampled from it.
@@ -18,7 +16,6 @@ constexpr float kRough = 0.3f;
 // Russian roulette by the weight of the last scattering alone: after a reconnection that is the same for the base path
 // and its shifts, whatever their throughputs. The bound keeps the ratio of two probabilities moderate.
 constexpr float kMinSurvival = 0.05f;
-constexpr int kRouletteStart = Roulette().start;
 
 bool roughSurface(const SurfaceParameters& s) {
   if (s.lobes == kLobeDiffuse) return true;
@@ -44,7 +41,7 @@ Bsdf GradientKernel::bsdfOf(const SurfaceParameters& s, const Hit& hit) {
 
 GradientKernel::GradientKernel(const TransportContext& context, const Plan& plan, const PassSampler& sampler,
                                std::vector<RecordedRay>* record)
-    : PathKernel(context, plan, sampler, record, {kNever}) {
+    : PathKernel(context, plan, sampler, record, {Roulette::kNever}) {
   lanes_.reserve(kBatch);
 }
 

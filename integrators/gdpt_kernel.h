@@ -41,6 +41,8 @@ struct GradientSample {
 
 class GradientKernel : PathKernel {
  public:
+  static constexpr int kRouletteStart = 5;  // segments from which base paths are ended at random
+
   GradientKernel(const TransportContext& context, const Plan& plan, const PassSampler& sampler,
                  std::vector<RecordedRay>* record);
 

@@ -139,12 +139,10 @@ bool PathKernel::scatter(PathState& path, const Hit& hit, const Bsdf& bsdf, bool
   path.lastPdfW = sample.pdfW;
   path.lightCouldNotBeSampled = sample.delta;
 
-  if (path.segments >= roulette_.start) {
-    const float survive = std::min(1.0f, maxComponent(path.throughput) / path.etaScale / roulette_.level);
-    if (survive < 1) {
-      if (!(block.u[slot::kRoulette] < survive)) return false;
-      path.throughput /= survive;
-    }
+  const float survival = roulette_.survival(path.segments, maxComponent(path.throughput) / path.etaScale);
+  if (survival < 1) {
+    if (!(block.u[slot::kRoulette] < survival)) return false;
+    path.throughput /= survival;
   }
   return true;
 }

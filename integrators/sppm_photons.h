@@ -38,7 +38,7 @@ uint64_t followLightPaths(const TransportContext& context, const PhotonEmission&
   settings.transport = Transport::Power;
   settings.maxSegments = maxDepth - 1;  // one more leads to the camera
   // Roulette from the first bounce keeps the photons' powers alike, which is what a density estimate wants.
-  settings.rouletteStart = 1;
+  settings.roulette = {1, 1};
   settings.mis = false;
   settings.deltaChains = mergesCaustics(context.scene, maxDepth);
   SubpathBatch batch(context, light.sampler, settings);

@@ -205,7 +205,7 @@ TEST_CASE("gdpt: the base path is the path tracer's") {
   // Before Russian roulette, which differs, the same random numbers give the same path.
   const auto check = [](const std::string& name, const Scene& scene) {
     Settings settings = settingsOf("gdpt", 24, 16, 1);
-    settings.maxDepth = Roulette().start;
+    settings.maxDepth = GradientKernel::kRouletteStart;
     settings.features = true;
     const Plan plan = makePlan(scene, scene.data().cameras.at(0), settings, integrators());
     const TransportContext context(scene, settings.lightStrategy);
@@ -213,7 +213,7 @@ TEST_CASE("gdpt: the base path is the path tracer's") {
     for (uint64_t pass = 0; pass < 8; ++pass) {
       const PassSampler sampler(SamplerKind::Independent, 0, 1, pass);
       for (int y = 0; y < settings.height; ++y) {
-        PathKernel path(context, plan, sampler, nullptr);
+        PathKernel path(context, plan, sampler, nullptr, {Roulette::kNever});
         GradientKernel gradient(context, plan, sampler, nullptr);
         for (int x = 0; x < settings.width; ++x) {
           const uint64_t key = sampler.itemKey(static_cast<uint64_t>(y * settings.width + x));

@@ -13,15 +13,9 @@
 #include "renderer/session/plan.h"
 #include "renderer/transport/context.h"
 #include "renderer/transport/light_reach.h"
+#include "renderer/transport/roulette.h"
 
 namespace braid {
-
-// Russian roulette of camera paths: from `start` segments on, a path whose throughput is below `level` goes on with
-// probability throughput / level.
-struct Roulette {
-  int start = 4;
-  float level = 1;
-};
 
 // Whether a scene needs an integrator, and why.
 struct Applies {
@@ -86,6 +80,7 @@ class Integrator {
   virtual uint64_t pixelKey(const PassSampler& sampler, const Plan& plan, int x, int y) const {
     return sampler.itemKey(pixelItem(plan, x, y));
   }
+  // Of the path kernel.
   virtual Roulette roulette() const { return {}; }
 };
 

@@ -69,7 +69,7 @@ WalkSettings probeWalk(Transport transport) {
   WalkSettings settings;
   settings.transport = transport;
   settings.maxSegments = kMaxSegments;
-  settings.rouletteStart = transport == Transport::Power ? 1 : kMaxSegments;
+  settings.roulette = {transport == Transport::Power ? 1 : Roulette::kNever, 1};
   settings.mis = false;
   return settings;
 }

@@ -239,12 +239,11 @@ bool SubpathBatch::scatter(SubpathState& state, const SubpathVertex& vertex) con
   state.deltaOnly = state.deltaOnly && sample.delta;
   if (!sample.delta) state.leastPdfW = std::min(state.leastPdfW, sample.pdfW);
 
-  if (state.segments >= settings_.rouletteStart) {
-    const float relative = maxComponent(state.throughput) / (state.startThroughput * state.etaScale);
-    if (relative < 1) {
-      if (!(block.u[slot::kRoulette] < relative)) return false;
-      state.throughput /= relative;
-    }
+  const float relative = maxComponent(state.throughput) / (state.startThroughput * state.etaScale);
+  const float survival = settings_.roulette.survival(state.segments, relative);
+  if (survival < 1) {
+    if (!(block.u[slot::kRoulette] < survival)) return false;
+    state.throughput /= survival;
   }
   ++state.segments;
   return true;

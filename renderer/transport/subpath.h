@@ -20,6 +20,7 @@
 #include "renderer/transport/bsdf.h"
 #include "renderer/transport/context.h"
 #include "renderer/transport/light_emission.h"
+#include "renderer/transport/roulette.h"
 
 namespace braid {
 
@@ -31,7 +32,7 @@ struct MisQuantities {
 struct WalkSettings {
   Transport transport = Transport::Radiance;
   int maxSegments = 32;
-  int rouletteStart = 4;     // segments before Russian roulette begins
+  Roulette roulette;
   double connectWeight = 0;  // (1 / etaVCM)² when vertices are merged as well, else 0
   double mergeWeight = 0;    // etaVCM² with etaVCM = π r² · light subpaths, else 0
   bool mis = true;           // false: the quantities are not needed and stay 0
