@@ -34,11 +34,17 @@ MethodResult run(const Case& c, double measured) {
   return make_uncorrelated()->run(in);
 }
 
-// What a strong sample in one pixel adds to the light of the image, mean over channels and runs: where the share rises,
-// the offset that the noise of the correlated image has in common changes sides, too.
-double lightAdded(CaseOptions o, size_t image, float excess) {
+// What a strong sample in one pixel adds.
+struct Added {
+  // To the light of the image, mean over channels and runs: where the share rises, the offset that the noise of the
+  // correlated image has in common changes sides, too.
+  double light = 0;
+  double peak = 0, highestPeak = 0;  // what the pixel has: mean over channels and runs, and most
+};
+
+Added addedBy(CaseOptions o, size_t image, float excess) {
   constexpr int kRuns = 16;
-  double added = 0, peak = 0;
+  Added added;
   for (int r = 0; r < kRuns; ++r) {
     o.seed = 1 + static_cast<uint64_t>(r);
     const MethodResult without = run(makeCase(o), 1);
@@ -52,11 +58,13 @@ double lightAdded(CaseOptions o, size_t image, float excess) {
     }
     const MethodResult with = run(c, 1);
     for (size_t k = 0; k < 3; ++k) {
-      added += (planeMean(with.image.mean[k]) - planeMean(without.image.mean[k])) * o.width * o.height / (3 * kRuns);
-      peak += static_cast<double>(with.image.mean[k].at(32, 32)) / (3 * kRuns);
+      added.light +=
+          (planeMean(with.image.mean[k]) - planeMean(without.image.mean[k])) * o.width * o.height / (3 * kRuns);
+      const auto peak = static_cast<double>(with.image.mean[k].at(32, 32));
+      added.peak += peak / (3 * kRuns);
+      added.highestPeak = std::max(added.highestPeak, peak);
     }
   }
-  CHECK(peak < 0.1 * static_cast<double>(excess));
   return added;
 }
 
@@ -224,7 +232,13 @@ TEST_CASE("A rare strong sample is shared out and not lost, on average over the 
     o.width = o.height = 64;
     o.constant = 1;
     o.correlatedNoise = correlatedNoise;
-    const double kept = (lightAdded(o, 0, kExcess) + lightAdded(o, 1, kExcess)) / static_cast<double>(kExcess);
+    const Added ofY = addedBy(o, 0, kExcess), ofZ = addedBy(o, 1, kExcess);
+    for (const Added& a : {ofY, ofZ}) {
+      CHECK(a.peak < 0.1 * static_cast<double>(kExcess));
+      // Where both images are as noisy, single runs leave up to 0.2.
+      if (correlatedNoise == 1) CHECK(a.highestPeak < 0.1 * static_cast<double>(kExcess));
+    }
+    const double kept = (ofY.light + ofZ.light) / static_cast<double>(kExcess);
     MESSAGE("noise of the correlated image ", correlatedNoise, ": kept ", kept);
     CHECK(kept > 0.9);
     CHECK(kept < 1.1);
