@@ -21,6 +21,7 @@ constexpr double kLevelEpsilon = 0.01;  // as in relL2
 constexpr double kWinsorise = 8;
 constexpr double kSignificance = 3;
 constexpr double kMargin = 1.1;  // of an error that is an estimate, too: the roundings of one of 10⁶ would be light
+constexpr double kPhotonMapDeviations = 1.5;  // of its window mean: one outlier alone makes a mean of one deviation
 constexpr double kOutlier = 64;
 
 double at(const Rgb<float>& image, size_t i, size_t c) { return static_cast<double>(image[c][i]); }
@@ -150,11 +151,13 @@ void countMissingLight(Plane<float>& error, const Estimate& unbiased, const Rgb<
   const auto windowMeans = [&](const Rgb<float>& image) {
     return boxMean(channelMean(image, [&image](size_t i, size_t c) { return at(image, i, c); }), kRadius);
   };
-  const Plane<double> x = windowMeans(unbiased.mean), s = windowMeans(photonMap.mean), v = windowMeans(variance);
+  const Plane<double> x = windowMeans(unbiased.mean), s = windowMeans(photonMap.mean), v = windowMeans(variance),
+                      noise = windowMeans(meanVariance(photonMap));
   const double pixels = sqr(2.0 * kRadius + 1);
   for (size_t i = 0; i < error.size(); ++i) {
     const double missing = s[i] - x[i], explained = static_cast<double>(photonMapError[i]);
-    if (missing > kMargin * std::sqrt(explained) + kSignificance * std::sqrt(v[i] / pixels))
+    const double deviation = std::sqrt((sqr(kSignificance) * v[i] + sqr(kPhotonMapDeviations) * noise[i]) / pixels);
+    if (missing > kMargin * std::sqrt(explained) + deviation)
       error[i] = std::max(error[i], finiteFloat(missing * missing - explained));
   }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What double shrinkage makes of photon maps beyond the paper: light that the unbiased image has not met, and priors
 // where they are of use.
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <string>
@@ -59,6 +60,33 @@ TEST_CASE("Missing light is the unbiased image's error, less what the photon map
   const double deviation = std::sqrt(2.0) * 0.03 * 13;
   CHECK(raised(1e-3f, noisy(level(0.8), 0.5 * deviation, 3), s, 0.01f)[45 * kWidth + 60] > 0.01f);
   CHECK(raised(1e-3f, noisy(level(0.8), 2 * deviation, 3), s, 0.01f)[45 * kWidth + 60] == 1e-3f);
+}
+
+TEST_CASE("Outliers of a photon map are no light that the unbiased image lacks, unless several agree") {
+  const Estimate x = noisy(one, 0.01, 14);
+  Estimate s = photonMap(one, 0.01, 15);
+  const auto outlierAt = [&s](int column, int row) {
+    const size_t i = s.mean[0].index(column, row);
+    for (size_t c = 0; c < 3; ++c) {
+      s.mean[c][i] = 1 + 1000;
+      s.half[0][c][i] = 1 + 2000;
+      s.variance[c][i] = 1000.0f * 1000;  // one pass of many has found it
+    }
+  };
+  const auto mostRaised = [&] {
+    float most = 0;
+    const Plane<float> e = raised(1e-3f, x, s, 1e-4f);
+    for (int dy = -6; dy <= 6; ++dy)
+      for (int dx = -6; dx <= 6; ++dx) most = std::max(most, e.at(60 + dx, 45 + dy));
+    return most;
+  };
+  outlierAt(60, 45);
+  CHECK(mostRaised() == 1e-3f);
+  outlierAt(63, 42);
+  CHECK(mostRaised() == 1e-3f);
+  outlierAt(57, 44);
+  outlierAt(61, 48);
+  CHECK(mostRaised() > 100);
 }
 
 TEST_CASE("A bias of a million that the photon map knows of is not missing light for the roundings in it") {
