@@ -26,8 +26,9 @@ Plane<float> unbiasedError(const Estimate& unbiased, const Rgb<float>& variance)
 // have not been found there, and a variance knows nothing of samples that never came. The difference D of the window
 // means must be beyond 1.1 times the photon map's error E_b and the noise of both means, three deviations of the
 // unbiased one and 1.5 of the photon map's: an outlier of it is about as large as its own deviation, and no light that
-// x lacks. Both are added as roots, for E_b may be a bias, of which noise takes nothing away. Then D² - E_b is the
-// squared error that E_b does not explain. D² would count it twice, which a photon map that is far off and says so
+// x lacks. The window without its largest pixel is asked, too, for an outlier's noise must not hide a caustic around
+// it. Errors and noise are added as roots, for E_b may be a bias, of which noise takes nothing away. Then D² - E_b is
+// the squared error that E_b does not explain. D² would count it twice, which a photon map that is far off and says so
 // turns into half of its image.
 void countMissingLight(Plane<float>& error, const Estimate& unbiased, const Rgb<float>& variance,
                        const Estimate& photonMap, const Plane<float>& photonMapError);

@@ -47,7 +47,7 @@ Plane<float> boxed(const Plane<float>& in) {
   return out;
 }
 
-// Means of non-negative values over the window without the largest of them.
+// Means over the window without the largest value, 0 where that is negative.
 Plane<double> trimmedMean(const Plane<float>& in) {
   Plane<float> rows(in.width, in.height);
   parallelRows(in.height, [&](int y) {
@@ -148,18 +148,24 @@ Plane<float> biasedError(const Estimate& biased, const Estimate& unbiased, const
 
 void countMissingLight(Plane<float>& error, const Estimate& unbiased, const Rgb<float>& variance,
                        const Estimate& photonMap, const Plane<float>& photonMapError) {
-  const auto windowMeans = [&](const Rgb<float>& image) {
-    return boxMean(channelMean(image, [&image](size_t i, size_t c) { return at(image, i, c); }), kRadius);
-  };
-  const Plane<double> x = windowMeans(unbiased.mean), s = windowMeans(photonMap.mean), v = windowMeans(variance),
-                      noise = windowMeans(meanVariance(photonMap));
+  const Rgb<float> ownNoise = meanVariance(photonMap);
+  const Plane<float> difference =
+      channelMean(variance, [&](size_t i, size_t c) { return at(photonMap.mean, i, c) - at(unbiased.mean, i, c); });
+  const Plane<float> noise = channelMean(ownNoise, [&](size_t i, size_t c) { return at(ownNoise, i, c); });
+  const Plane<double> v =
+      boxMean(channelMean(variance, [&](size_t i, size_t c) { return at(variance, i, c); }), kRadius);
   const double pixels = sqr(2.0 * kRadius + 1);
-  for (size_t i = 0; i < error.size(); ++i) {
-    const double missing = s[i] - x[i], explained = static_cast<double>(photonMapError[i]);
-    const double deviation = std::sqrt((sqr(kSignificance) * v[i] + sqr(kPhotonMapDeviations) * noise[i]) / pixels);
-    if (missing > kMargin * std::sqrt(explained) + deviation)
-      error[i] = std::max(error[i], finiteFloat(missing * missing - explained));
-  }
+  const auto raiseWhereDark = [&](const Plane<double>& missing, const Plane<double>& noiseAround) {
+    for (size_t i = 0; i < error.size(); ++i) {
+      const auto explained = static_cast<double>(photonMapError[i]);
+      const double deviation =
+          std::sqrt((sqr(kSignificance) * v[i] + sqr(kPhotonMapDeviations) * noiseAround[i]) / pixels);
+      if (missing[i] > kMargin * std::sqrt(explained) + deviation)
+        error[i] = std::max(error[i], finiteFloat(missing[i] * missing[i] - explained));
+    }
+  };
+  raiseWhereDark(boxMean(difference, kRadius), boxMean(noise, kRadius));
+  raiseWhereDark(trimmedMean(difference), trimmedMean(noise));  // light that an outlier's noise would hide
 }
 
 Plane<float> priorError(const Rgb<float>& prior, const Rgb<float> (&halves)[2], const Estimate& x,
