@@ -41,8 +41,8 @@ struct UncorrelatedInputs {
 
 // How uncertain pixels are, from their mean and its variance: their variance or usualVariance() around them, whichever
 // is larger, for a pixel may be without any by chance; and the latter alone where the mean is below twice its
-// deviation, as that of one rare strong sample is, unless three of the eight neighbours have a sixteenth of its variance
-// or more: rare samples seldom meet, those of a lamp's mirror image do.
+// deviation, as that of one rare strong sample is, unless three of the eight neighbours have a sixteenth of its
+// variance or more: rare samples seldom meet, those of a lamp's mirror image do.
 Rgb<float> noiseLevels(const Rgb<float>& mean, const Rgb<float>& variance);
 
 // The combination for one gamma >= 0. With gamma 0 all k_i are 1/224 and the centre keeps nothing.
