@@ -23,4 +23,9 @@ Plane<float> channelMean(const Rgb<float>& like, const Map& map) {
   return channelMean(like.width(), like.height(), map);
 }
 
+// The channel mean of an image.
+inline Plane<float> channelMean(const Rgb<float>& image) {
+  return channelMean(image, [&image](size_t i, size_t c) { return static_cast<double>(image[c][i]); });
+}
+
 }  // namespace braid

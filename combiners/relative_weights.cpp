@@ -21,10 +21,9 @@ constexpr double kImprovement = 1e-5;  // weights to 1e-9 of the error change no
 }  // namespace
 
 Plane<float> relativeErrorRoots(const Rgb<float>& guide, const Rgb<float>& variance) {
-  const Plane<float> own = channelMean(guide, [&](size_t i, size_t c) { return static_cast<double>(guide[c][i]); });
+  const Plane<float> own = channelMean(guide);
   const Plane<float> around = boxMean<float>(own, 1);
-  const Plane<float> noise =
-      channelMean(variance, [&](size_t i, size_t c) { return static_cast<double>(variance[c][i]); });
+  const Plane<float> noise = channelMean(variance);
   Plane<float> out(guide.width(), guide.height(), kUnfilled);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {

@@ -92,7 +92,7 @@ DoubleShrinkage doubleShrinkage(double unbiasedError, double biasedError, double
 }
 
 Plane<float> unbiasedError(const Estimate& unbiased, const Rgb<float>& variance) {
-  Plane<float> error = boxed(channelMean(variance, [&](size_t i, size_t c) { return at(variance, i, c); }));
+  Plane<float> error = boxed(channelMean(variance));
   raise(error, unbiased.mean, 1e-8, 1e-4);
   return error;
 }
@@ -105,7 +105,7 @@ Plane<float> squaredBiasSamples(const Estimate& photonMap) {
 
 PhotonMapError photonMapError(const Estimate& photonMap, const Features* features, const Estimate* unbiased) {
   const Rgb<float> noise = meanVariance(photonMap);
-  const Plane<float> spread = channelMean(noise, [&](size_t i, size_t c) { return at(noise, i, c); });
+  const Plane<float> spread = channelMean(noise);
   const Plane<float> squaredBias = squaredBiasSamples(photonMap);
   const Plane<float> limited = withoutOutliers(spread);
   std::vector<Plane<float>> smooth = jointFilter({&limited, &squaredBias}, features, kRadius);
@@ -148,12 +148,10 @@ Plane<float> biasedError(const Estimate& biased, const Estimate& unbiased, const
 
 void countMissingLight(Plane<float>& error, const Estimate& unbiased, const Rgb<float>& variance,
                        const Estimate& photonMap, const Plane<float>& photonMapError) {
-  const Rgb<float> ownNoise = meanVariance(photonMap);
   const Plane<float> difference =
       channelMean(variance, [&](size_t i, size_t c) { return at(photonMap.mean, i, c) - at(unbiased.mean, i, c); });
-  const Plane<float> noise = channelMean(ownNoise, [&](size_t i, size_t c) { return at(ownNoise, i, c); });
-  const Plane<double> v =
-      boxMean(channelMean(variance, [&](size_t i, size_t c) { return at(variance, i, c); }), kRadius);
+  const Plane<float> noise = channelMean(meanVariance(photonMap));
+  const Plane<double> v = boxMean(channelMean(variance), kRadius);
   const double pixels = sqr(2.0 * kRadius + 1);
   const auto raiseWhereDark = [&](const Plane<double>& missing, const Plane<double>& noiseAround) {
     for (size_t i = 0; i < error.size(); ++i) {
@@ -182,8 +180,7 @@ Plane<float> priorError(const Rgb<float>& prior, const Rgb<float> (&halves)[2], 
     const double between = at(halves[0], i, c) - at(halves[1], i, c);
     return across(i, c, limit) - 2 * at(variance, i, c) - 0.25 * between * between;
   });
-  const Plane<double> level =
-      boxMean(channelMean(prior, [&](size_t i, size_t c) { return at(prior, i, c); }), kLevelRadius);
+  const Plane<double> level = boxMean(channelMean(prior), kLevelRadius);
   const auto unit = [&](size_t i) { return std::sqrt(sqr(level[i]) + kLevelEpsilon); };
   for (size_t i = 0; i < samples.size(); ++i) samples[i] = finiteFloat(static_cast<double>(samples[i]) / unit(i));
   Plane<float> out = boxed(samples);
