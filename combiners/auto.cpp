@@ -3,7 +3,8 @@
 // combiners/auto.md; its steps are
 //   1. x: the unbiased image, fused with photon maps by their estimated errors (fused_estimate.h);
 //   2. outliers of x that one or two quarters alone speak for are replaced (despike.h);
-//   3. bases: patch-Welch filters of x, and the denoisers that the user asked for;
+//   3. bases: patch-Welch filters of x, of its direct and indirect light apart where these are known (light_parts.h),
+//      and the denoisers that the user asked for;
 //   4. candidates: every base, and x shrunk towards it (shrinkage.h);
 //   5. an ensemble of the candidates, with errors measured across halves (relative_weights.h);
 //   6. the result filtered once more, where halves show its use (second_pass.h);
@@ -19,6 +20,7 @@
 #include "combiners/error_map.h"
 #include "combiners/finite_float.h"
 #include "combiners/fused_estimate.h"
+#include "combiners/light_parts.h"
 #include "combiners/recipe.h"
 #include "combiners/registry.h"
 #include "combiners/relative_weights.h"
@@ -33,6 +35,7 @@ const OptionInfo kPatch{"auto-patch", 15, "Width in pixels of the patches that e
 const OptionInfo kFuse{"auto-fuse", 1, "0: photon maps are bases, not part of the image that is denoised"};
 const OptionInfo kShrink{"auto-shrink", 1, "0: bases only, without James-Stein shrinkage towards them"};
 const OptionInfo kSecondPass{"auto-second-pass", 1, "0: the combined image is not filtered once more"};
+const OptionInfo kLightParts{"auto-light-parts", 1, "0: direct and indirect light are filtered together"};
 const OptionInfo kDespike{"auto-despike", 1, "0: keep outliers"};
 
 constexpr uint64_t kFewestPasses = 4;       // fewer: the first filter alone
@@ -54,11 +57,13 @@ class Auto : public Method {
     Needs needs;
     needs.anyBases = true;
     needs.features = needs.featureNoise = true;
-    needs.quartersHelp = true;
+    needs.quartersHelp = needs.lightPartsHelp = true;
     return needs;
   }
   MethodMemory memory(const MemoryCase& of) const override;
-  std::vector<OptionInfo> options() const override { return {kPatch, kFuse, kShrink, kDespike, kSecondPass}; }
+  std::vector<OptionInfo> options() const override {
+    return {kPatch, kFuse, kLightParts, kShrink, kDespike, kSecondPass};
+  }
   MethodResult run(const MethodInputs& in) const override;
 };
 
@@ -108,6 +113,24 @@ std::vector<Estimate> filtersOf(const Estimate& x, const Features* features, con
   auto careful = patchWelch(robust, std::array{kPatchWelchThreshold}, kCarefulNeighbours, {}, cancel);
   bases.push_back(asEstimate(std::move(careful[0]), "pw-robust"));
   return bases;
+}
+
+// The same filters of direct and of indirect light, added up.
+std::vector<Estimate> filtersOfParts(const Estimate& x, bool despike, const Features* features,
+                                     const std::atomic<bool>* cancel) {
+  std::vector<Estimate> sums;
+  for (Estimate (*part)(const Estimate&) : {directLight, indirectLight}) {
+    Estimate light = part(x);
+    if (despike) {
+      const std::vector<Spike> spikes = findSpikes(light, {}, features);
+      for (Rgb<float>* image : {&light.mean, &light.half[0], &light.half[1]}) replaceValues(*image, spikes);
+      replaceVariances(light.variance, spikes);
+    }
+    std::vector<Estimate> filtered = filtersOf(light, features, cancel);
+    for (size_t i = 0; i < sums.size() && i < filtered.size(); ++i) addImage(sums[i], filtered[i]);
+    if (sums.empty()) sums = std::move(filtered);
+  }
+  return sums;
 }
 
 // The outside base as a filter of x: a denoiser that has seen the unbiased image alone is run again.
@@ -204,7 +227,11 @@ MethodResult Auto::run(const MethodInputs& in) const {
     whole = &changeable(*whole);
     if (own->variance.empty()) own->variance = meanVariance(*whole);
   }
-  if (in.options.number(kDespike) != 0 && mayBeMeasured(*whole)) {
+  const bool despike = in.options.number(kDespike) != 0 && mayBeMeasured(*whole);
+  std::vector<Estimate> filters;  // of the parts before outliers of the whole are replaced
+  if (photonMaps.empty() && in.options.number(kLightParts) != 0 && mayBeMeasured(*whole) && hasLightParts(*whole))
+    filters = filtersOfParts(*whole, despike, in.features, in.cancel);
+  if (despike) {
     const GivenQuarters quarters = photonMaps.empty() ? in.quarters : GivenQuarters{&fused.image.quarter};
     const std::vector<Spike> spikes = findSpikes(*whole, quarters, in.features);
     result.remarks.push_back(countRemark("replacedOutliers", spikes.size()));
@@ -219,7 +246,9 @@ MethodResult Auto::run(const MethodInputs& in) const {
   const Estimate& x = *whole;
   std::vector<Estimate> bases;
   for (const Estimate* b : others) bases.push_back(consistentHalves(baseOf(*b, x, !photonMaps.empty(), in)));
-  for (Estimate& e : filtersOf(x, in.features, in.cancel)) bases.push_back(std::move(e));
+  if (filters.empty()) filters = filtersOf(x, in.features, in.cancel);
+  for (Estimate& e : filters) bases.push_back(std::move(e));
+  filters.clear();
   const auto cancelled = [&] { return in.cancel && in.cancel->load(); };
   if (cancelled()) return result;
   if (bases.empty() || !mayBeMeasured(x)) {

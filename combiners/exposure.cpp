@@ -157,7 +157,7 @@ double exposureScale(const Rgb<float>& image) {
   return count > 0 ? kMiddleGrey / std::exp2(sum / count) : 1.0;
 }
 
-Estimate normalised(const Estimate& e, double k, SanitiseReport& report, bool quarters) {
+Estimate normalised(const Estimate& e, double k, SanitiseReport& report, bool quarters, bool lightParts) {
   Estimate out;
   static_cast<EstimateHead&>(out) = e;
   out.mean = changed(e.mean, colours(k), report);
@@ -167,13 +167,19 @@ Estimate normalised(const Estimate& e, double k, SanitiseReport& report, bool qu
   out.variance = changed(e.variance, variances(k), report);
   out.bias = changed(e.bias, colours(k), report);
   out.biasVariance = changed(e.biasVariance, variances(k), report);
+  if (!lightParts) return out;
+  out.direct.mean = changed(e.direct.mean, colours(k), report);
+  for (size_t h = 0; h < 2; ++h) out.direct.half[h] = changed(e.direct.half[h], colours(k), report);
+  out.direct.variance = changed(e.direct.variance, variances(k), report);
+  out.indirectVariance = changed(e.indirectVariance, variances(k), report);
   return out;
 }
 
 Estimates normalised(const Estimates& all, double k, SanitiseReport& report, const PlanesRead& read) {
   Estimates out;
   static_cast<EstimatesHead&>(out) = all;
-  for (const Estimate& e : all.estimates) out.estimates.push_back(normalised(e, k, report, read.quarters));
+  for (const Estimate& e : all.estimates)
+    out.estimates.push_back(normalised(e, k, report, read.quarters, read.lightParts));
   if (read.history)
     for (const auto& [name, checkpoints] : all.history)
       for (const Checkpoint& c : checkpoints) out.history[name].push_back(changed(c, k, report));

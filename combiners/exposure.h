@@ -34,6 +34,7 @@ struct PlanesRead {
   bool quarters = true, history = true;
   bool features = true, featureNoise = true;  // the noise: halves and variances
   bool reference = true;
+  bool lightParts = true;
 };
 
 // The estimates as methods see them. Non-finite values and negative variances become 0. Colours and biases are
@@ -41,7 +42,8 @@ struct PlanesRead {
 // square, so that fourth powers stay within floats; the sun in a dark room is below it. What was changed is added to
 // the report.
 Estimates normalised(const Estimates& estimates, double k, SanitiseReport& report, const PlanesRead& read = {});
-Estimate normalised(const Estimate& estimate, double k, SanitiseReport& report, bool quarters = true);
+Estimate normalised(const Estimate& estimate, double k, SanitiseReport& report, bool quarters = true,
+                    bool lightParts = true);
 
 // Whether methods may see features, or only their means, as they are: nothing of them would be changed.
 bool isSane(const Features& features, bool noise);

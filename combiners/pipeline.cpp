@@ -269,7 +269,8 @@ PlanesRead planesRead(const Recipe& recipe) {
   const bool reference = std::any_of(recipe.steps.begin(), recipe.steps.end(), [](const Step& step) {
     return step.obstacle.empty() && step.method->needs().reference;
   });
-  return {quarters, needs.checkpoints > 0 || !needs.stops.empty(), needs.features, needs.featureNoise, reference};
+  return {quarters,        needs.checkpoints > 0 || !needs.stops.empty(), needs.features, needs.featureNoise, reference,
+          needs.lightParts};
 }
 
 PipelineResult runPipeline(const Estimates& estimates, const std::vector<std::string>& wanted,

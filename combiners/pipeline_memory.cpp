@@ -19,6 +19,7 @@ int imagesOf(const EstimateFacts& e) {
   if (e.variance) bytes += kColour;
   if (e.quarters) bytes += 4 * kColour;
   if (e.bias) bytes += 2 * kColour;
+  if (e.lightParts) bytes += 5 * kColour;
   return bytes;
 }
 
@@ -69,6 +70,7 @@ constexpr int kFeatureMemory = 4 * kFeatureComponents * static_cast<int>(sizeof(
 Facts copiedFacts(Facts facts, const PlanesRead& read) {
   for (EstimateFacts& e : facts.estimates) {
     e.quarters &= read.quarters;
+    e.lightParts &= read.lightParts;
     if (read.history) continue;
     e.checkpoints = 0;
     e.kept.clear();

@@ -62,6 +62,7 @@ class RecipeMaker {
   std::string fillCorrelated(Step& step);
   std::string fillBiased(Step& step, const std::string& chosen);
   std::string fillBases(Step& step, const std::string& chosen);
+  bool readsLightParts(const Step& step) const;
   void fillStop(Step& step);
   std::string defaultBiased(const Needs& needs);
   std::vector<std::string> denoisersInOrder() const;
@@ -100,6 +101,7 @@ void RecipeMaker::fill(Step& step, const std::string& chosen) {
     step.obstacle = "it takes no biased input";
   if (step.obstacle.empty() && takesBases) step.obstacle = fillBases(step, needs.biased ? "" : chosen);
   if (step.obstacle.empty()) fillStop(step);
+  step.lightParts = step.obstacle.empty() && readsLightParts(step);
 }
 
 // What an estimate lacks for the needs, or nothing.
@@ -224,6 +226,15 @@ std::string RecipeMaker::fillBases(Step& step, const std::string& chosen) {
   return {};
 }
 
+bool RecipeMaker::readsLightParts(const Step& step) const {
+  const EstimateFacts* e = facts_.find(step.unbiased);
+  return step.method->needs().lightPartsHelp && e && e->lightParts &&
+         std::none_of(step.bases.begin(), step.bases.end(), [&](const std::string& name) {
+           const EstimateFacts* base = facts_.find(name);
+           return base && base->bias;
+         });
+}
+
 void RecipeMaker::fillStop(Step& step) {
   const auto* stopping = dynamic_cast<const StoppingMethod*>(step.method.get());
   if (!stopping) return;
@@ -301,7 +312,7 @@ Facts factsOf(const Estimates& all) {
     facts.estimates.push_back({e.name, e.unbiased, e.correlation, e.passes, !e.half[0].empty() && !e.half[1].empty(),
                                !e.variance.empty(), e.quarter.size() == 4 && (e.passes == 0 || e.passes >= 4),
                                history == all.history.end() ? 0 : static_cast<int>(history->second.size()),
-                               std::move(kept), !e.bias.empty()});
+                               std::move(kept), !e.bias.empty(), !e.direct.mean.empty()});
   }
   return facts;
 }
@@ -329,6 +340,7 @@ RecipeNeeds needsOf(const Recipe& recipe) {
     all.quarters |= needs.quarters || needs.quartersHelp;
     all.features |= needs.features;
     all.featureNoise |= needs.featureNoise;
+    all.lightParts |= step.lightParts;
     all.checkpoints = std::max(all.checkpoints, needs.checkpoints);
     if (step.stop > 0) all.stops.push_back(step.stop);
   }

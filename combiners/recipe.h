@@ -53,6 +53,7 @@ struct EstimateFacts {
   int checkpoints = 0;
   std::vector<uint64_t> kept{};  // passes of the checkpoints with their image, rising
   bool bias = false;             // whether there is an estimate of it
+  bool lightParts = false;       // whether direct light is known by itself
 };
 
 struct Facts {
@@ -74,7 +75,8 @@ struct Step {
   // Passes of the earlier image that a denoiser reads in place of the newest, and whose denoised image a combiner
   // reads; 0: none.
   uint64_t kept = 0;
-  std::string note;  // what a user should know although it runs, in one sentence; mostly empty
+  bool lightParts = false;  // whether the method reads the direct light of the unbiased estimate
+  std::string note;         // what a user should know although it runs, in one sentence; mostly empty
 };
 
 struct Recipe {
@@ -88,7 +90,7 @@ Recipe makeRecipe(const Facts& facts, const std::vector<std::string>& wanted, co
 
 // What a render must keep for the steps that can run.
 struct RecipeNeeds {
-  bool quarters = false, features = false, featureNoise = false;
+  bool quarters = false, features = false, featureNoise = false, lightParts = false;
   int checkpoints = 0;
   std::vector<uint64_t> stops{};  // passes after which the image is kept, rising
 };

@@ -20,6 +20,11 @@ const Vec3& receiverNormal(const Hit& hit, bool twoSided) { return twoSided ? hi
 
 }  // namespace
 
+void PathKernel::add(const Spectrum& radiance, bool direct, PathSample& sample) const {
+  sample.radiance += radiance;
+  if (direct) sample.direct += radiance;
+}
+
 void PathKernel::addEnvironment(const PathState& path, PathSample& sample) const {
   const bool fromCamera = path.segments == 1;
   if (fromCamera) sample.coverage = 0;
@@ -38,7 +43,7 @@ void PathKernel::addEnvironment(const PathState& path, PathSample& sample) const
   float weight = 1;
   if (!path.lightCouldNotBeSampled)
     weight = powerHeuristic(path.lastPdfW, context_.lights.pdfEnvironment(path.direction));
-  sample.radiance += path.throughput * radiance * weight;
+  add(path.throughput * radiance * weight, path.bounces <= 1, sample);
 }
 
 void PathKernel::addEmission(const PathState& path, const Hit& hit, PathSample& sample) const {
@@ -57,7 +62,7 @@ void PathKernel::addEmission(const PathState& path, const Hit& hit, PathSample& 
                                                          static_cast<size_t>(emitter), distance, cosLight));
     }
   }
-  sample.radiance += path.throughput * radiance * weight;
+  add(path.throughput * radiance * weight, path.bounces <= 1, sample);
 }
 
 // A solid's surface inside a solid that rules there scatters nothing: keeps the books of what the path is inside of and
@@ -75,7 +80,7 @@ bool PathKernel::crossNullInterface(PathState& path, const Hit& hit) const {
 // What an unlit surface shows, it shows to the camera and to mirrors only: it lights nothing (KHR_materials_unlit).
 void PathKernel::addUnlit(PathState& path, const Hit& hit, PathSample& sample) const {
   const Spectrum color = baseColorAt(scene_, hit);
-  if (path.lightCouldNotBeSampled) sample.radiance += path.throughput * color;
+  if (path.lightCouldNotBeSampled) add(path.throughput * color, path.bounces <= 1, sample);
   if (!wantFeatures_ || path.featuresDone) return;
   path.featuresDone = true;
   sample.features.setAlbedo(color);
@@ -260,7 +265,7 @@ void PathKernel::traceShadows() {
     if (observer_) observer_->onLight(shadow, !hidden[static_cast<size_t>(k)]);
     if (hidden[static_cast<size_t>(k)]) continue;
     PathSample& sample = sample_[static_cast<size_t>(shadowPath_[static_cast<size_t>(k)])];
-    sample.radiance += shadow.contribution;
+    add(shadow.contribution, shadow.direct, sample);
     if (shadow.forFeatures) sample.features.visibility = 1;
   }
   shadowRayCount += static_cast<uint64_t>(shadowCount_);
@@ -292,7 +297,9 @@ bool PathKernel::shade(PathState& path, const Hit& hit, const SampleBlock& block
   if (bsdf.hasNonDelta()) {
     hasShadow = sampleLight(path, hit, bsdf, twoSided, block, shadow);
     shadow.forFeatures = firstNonSpecular && path.featuresDone;
+    shadow.direct = path.bounces == 0;
   }
+  if (path.bounces > 0 || bsdf.hasNonDelta()) ++path.bounces;
   if (!scatter(path, hit, bsdf, twoSided, block)) return false;
   ++path.segments;
   return true;

@@ -16,6 +16,7 @@ namespace braid {
 // What one camera path returns.
 struct PathSample {
   Spectrum radiance{0};
+  Spectrum direct{0};  // the direct part of it
   float coverage = 1;  // 0 when the camera ray misses everything
   FeatureSample features;
 };
@@ -25,6 +26,7 @@ struct ShadowRay {
   RayQuery ray;
   Spectrum contribution;  // to the path's radiance if nothing lies between
   bool forFeatures;       // also the visibility feature
+  bool direct;            // of the first non-specular vertex
 };
 
 // Sees the steps of a path, for replay.
@@ -79,6 +81,7 @@ class PathKernel {
   void addEnvironment(const PathState& path, PathSample& sample) const;
   void addEmission(const PathState& path, const Hit& hit, PathSample& sample) const;
   void addUnlit(PathState& path, const Hit& hit, PathSample& sample) const;
+  void add(const Spectrum& radiance, bool direct, PathSample& sample) const;
   bool crossNullInterface(PathState& path, const Hit& hit) const;
   bool sampleLight(const PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const SampleBlock& block,
                    ShadowRay& shadow) const;

@@ -25,6 +25,7 @@ struct PathState {
   bool lightCouldNotBeSampled = true;  // camera, delta scattering, or a null interface crossed since
 
   float etaScale = 1;         // undoes the radiance compression of refraction in Russian roulette
+  int bounces = 0;            // scattered at the first non-specular vertex and since; up to 1 of them, light is direct
   bool featuresDone = false;  // the first non-specular vertex is behind
   float featureDistance = 0;  // metres travelled up to it
 };

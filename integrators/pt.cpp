@@ -22,6 +22,8 @@ class PathTracer final : public Integrator {
     return {true, "unbiased for every scene"};
   }
 
+  bool separatesDirectLight() const override { return true; }
+
   std::unique_ptr<PassSampler> pixelSampler(const Plan& plan, uint64_t pass) const override {
     return std::make_unique<PassSampler>(plan.settings.sampler, plan.settings.seed, kStream, pass);
   }

@@ -60,14 +60,18 @@ inline uint64_t pixelCount(const PixelWindow& w) {
 // Hands a path's result to the film: clamped only when asked to.
 inline void storeSample(const PassRequest& request, int x, int y, const PathSample& sample, PassTarget& target) {
   const Plan& plan = request.plan;
-  Spectrum radiance = sample.radiance;
+  Spectrum radiance = sample.radiance, direct = sample.direct;
   if (plan.settings.clamp > 0) {
     const float largest = maxComponent(radiance);
-    if (largest > plan.settings.clamp) radiance *= plan.settings.clamp / largest;
+    if (largest > plan.settings.clamp) {
+      radiance *= plan.settings.clamp / largest;
+      direct *= plan.settings.clamp / largest;
+    }
   }
   const int px = x - plan.window.x0, py = y - plan.window.y0;
   if (!target.add(px, py, radiance) && request.statistics)
     request.statistics->rejectedPixel = static_cast<int64_t>(y) * plan.settings.width + x;
+  if (target.wantsDirect()) target.direct(px, py, direct);
   if (plan.features) target.features(px, py, sample.features);
   if (target.wantsCoverage()) target.coverage(px, py, sample.coverage);
 }

@@ -28,15 +28,17 @@ struct Ratio {
 // Sums over seeds for each value of an image, and per seed over the image.
 class Calibration {
  public:
-  explicit Calibration(const RenderResult& pilot) : weight_(pilot.estimates->width, pilot.estimates->height) {
+  explicit Calibration(const RenderResult& pilot) : Calibration(estimateOf(pilot)) {}
+  explicit Calibration(const Estimate& pilot) : weight_(pilot.mean.width(), pilot.mean.height()) {
     for (size_t c = 0; c < 3; ++c) {
-      const PixelBuffer<float>& v = estimateOf(pilot).variance[c].data;
+      const PixelBuffer<float>& v = pilot.variance[c].data;
       std::vector<float> sorted(v.begin(), v.end());
       std::nth_element(sorted.begin(), sorted.begin() + static_cast<ptrdiff_t>(v.size() / 2), sorted.end());
       for (size_t i = 0; i < v.size(); ++i) weight_[c][i] = 1 / static_cast<double>(v[i] + sorted[v.size() / 2]);
     }
   }
-  void add(const RenderResult& result) { estimates_.push_back(estimateOf(result)); }
+  void add(const RenderResult& result) { add(estimateOf(result)); }
+  void add(const Estimate& estimate) { estimates_.push_back(estimate); }
 
   Ratio reportedOverEmpirical(bool pixelByPixel) const {
     const auto n = static_cast<double>(estimates_.size());
@@ -105,7 +107,7 @@ inline Settings clampedSettings(int width, int height, uint64_t spp, SamplerKind
   return settings;
 }
 
-inline void checkCalibration(const Calibration& calibration, const std::string& name, bool independent) {
+inline void checkVariance(const Calibration& calibration, const std::string& name, bool independent) {
   const Ratio ratio = calibration.reportedOverEmpirical(false), byPixel = calibration.reportedOverEmpirical(true);
   const double correlation = calibration.halvesCorrelation();
   MESSAGE(name, ": ratio ", ratio.value, " +- ", ratio.error, ", pixel by pixel ", byPixel.value, " +- ", byPixel.error,
@@ -119,6 +121,10 @@ inline void checkCalibration(const Calibration& calibration, const std::string& 
     CHECK(byPixel.value < 1.1);
   }
   CHECK(correlation < kSigmas);
+}
+
+inline void checkCalibration(const Calibration& calibration, const std::string& name, bool independent) {
+  checkVariance(calibration, name, independent);
   CHECK(calibration.meanOfHalvesIsMean());
 }
 

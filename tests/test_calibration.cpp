@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The reported variance of path tracing; how it is measured: calibration.h.
+// The reported variance of path tracing, and of its direct and indirect light; how it is measured: calibration.h.
+#include "combiners/light_parts.h"
 #include "renderer/scene/gltf.h"
 #include "tests/calibration.h"
 
@@ -22,7 +23,33 @@ void checkScene(const std::string& name, const Scene& scene, int width, int heig
     }
 }
 
+using Part = Estimate (*)(const Estimate&);
+
+void checkParts(const std::string& name, const Scene& scene, uint64_t seeds) {
+  const auto rendered = [&](uint64_t spp, SamplerKind sampler, uint64_t seed) {
+    Settings settings = clampedSettings(24, 24, spp, sampler, seed);
+    settings.lightParts = settings.quarters = true;
+    return render(scene, settings);
+  };
+  const RenderResult pilot = rendered(256, SamplerKind::Independent, 1000);
+  for (const SamplerKind sampler : {SamplerKind::Independent, SamplerKind::Sobol}) {
+    std::vector<RenderResult> results;
+    for (uint64_t seed = 0; seed < seeds; ++seed) results.push_back(rendered(16, sampler, seed));
+    const bool independent = sampler == SamplerKind::Independent;
+    for (const auto& [part, what] :
+         {std::pair<Part, const char*>{directLight, "direct"}, {indirectLight, "indirect"}}) {
+      Calibration calibration(part(estimateOf(pilot)));
+      for (const RenderResult& r : results) calibration.add(part(estimateOf(r)));
+      checkVariance(calibration, name + ", " + what + (independent ? " independent" : " sobol"), independent);
+    }
+  }
+}
+
 }  // namespace
+
+TEST_CASE("calibration: reported variances of direct and of indirect light are true on the Cornell box") {
+  checkParts("cornell", Scene(cornellBox()), 192);
+}
 
 TEST_CASE("calibration: reported variance is true on the Cornell box") {
   checkScene("cornell", Scene(cornellBox()), 24, 24, 64);

@@ -343,6 +343,22 @@ TEST_CASE("auto fuses what an auto plan rendered, offline as in process") {
   CHECK(identical(a.rgb("combined.auto"), readImage(folder.path / "c.exr").rgb("combined.auto")));
 }
 
+TEST_CASE("auto filters direct and indirect light apart, offline as in process") {
+  const Folder folder;
+  const std::string options = "render '" BRAID_SOURCE_DIR "/scenes/cornell.glb' -q --size 48x27 --spp 8 --float ";
+  REQUIRE(braidRun(folder, options + "--combine auto --quarters --light-parts -o a.exr").code == 0);
+  REQUIRE(braidRun(folder, options + "--quarters --light-parts -o b.exr").code == 0);
+  const ImageFile a = readImage(folder.path / "a.exr");
+  for (const char* layer : {"pt.direct", "pt.directA", "pt.directB", "pt.directVariance", "pt.indirectVariance"})
+    CHECK_MESSAGE(hasLayer(a, layer), layer);
+  for (const char* file : {"a.exr", "b.exr"}) {
+    combined(folder, "--unbiased " + std::string(file) + " --method auto -o c.exr");
+    CHECK(identical(a.rgb("combined.auto"), readImage(folder.path / "c.exr").rgb("combined.auto")));
+  }
+  combined(folder, "--unbiased a.exr --method auto --auto-light-parts 0 -o d.exr");
+  CHECK_FALSE(identical(a.rgb("combined.auto"), readImage(folder.path / "d.exr").rgb("combined.auto")));
+}
+
 TEST_CASE("bench tells what denoisers and combiners cost, inputs first") {
   const Folder folder;
   const Run run = braidRun(folder, "bench --combine pw,js@pw,uncorrelated --size 32x24 --spp 8 --repeats 1 --json");

@@ -26,6 +26,17 @@ Case caseOf(uint64_t samples) {
   return makeCase(options);
 }
 
+// The same with a third of the light direct.
+Case withLightParts(Case c) {
+  Estimate& e = c.estimates.estimates[0];
+  e.direct = {e.mean, {e.half[0], e.half[1]}, e.variance};
+  for (Rgb<float>* image : {&e.direct.mean, &e.direct.half[0], &e.direct.half[1]})
+    for (Plane<float>& plane : image->channel)
+      for (float& value : plane.data) value /= 3;
+  e.indirectVariance = e.variance;
+  return c;
+}
+
 MethodInputs inputsOf(const Case& c, const std::vector<const char*>& bases, const char* biased) {
   MethodInputs in;
   in.unbiased = &c.pt();
@@ -81,8 +92,20 @@ TEST_CASE("every method states its memory to 10 %") {
   }
 }
 
+TEST_CASE("auto states its memory where it filters direct and indirect light apart") {
+  const std::shared_ptr<const Method> method = findMethod("auto");
+  for (const uint64_t samples : {2u, 16u, 64u}) {
+    const Case c = withLightParts(caseOf(samples));
+    withThreads(kThreads, [&] {
+      for (const std::vector<const char*>& bases :
+           std::vector<std::vector<const char*>>{{}, {"narrow"}, {"narrow", "wide"}, {"sppm"}})
+        checkMemory(*method, c, bases);
+    });
+  }
+}
+
 TEST_CASE("the pipeline takes the memory that follows from a recipe") {
-  Case c = caseOf(16);
+  Case c = withLightParts(caseOf(16));
   c.estimates.reference = c.truth;
   const Facts facts = factsOf(c.estimates);
   for (const std::vector<std::string>& wanted : std::vector<std::vector<std::string>>{
@@ -97,7 +120,7 @@ TEST_CASE("the pipeline takes the memory that follows from a recipe") {
 }
 
 TEST_CASE("estimates take the memory that follows from their facts") {
-  const Case c = caseOf(4);
+  const Case c = withLightParts(caseOf(4));
   const int64_t before = heapBytes();
   const Estimates copy = c.estimates;
   CHECK(perPixel(heapBytes() - before) == doctest::Approx(estimatesMemory(factsOf(copy))).epsilon(0.02));

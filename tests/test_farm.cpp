@@ -376,7 +376,7 @@ TEST_CASE("Every option given to plan is carried on, and none that a share or th
   const std::string options =
       "plan " + kCornell +
       " -q --size 26x17 --spp 8 --yfov 40 --light-scale 2 --no-default-light --sampler independent "
-      "--aovs features --float --exposure 1 --combine uncorrelated,curves --biased box "
+      "--aovs features --float --exposure 1 --combine auto,uncorrelated,curves --biased box "
       "--integrator pt,crn --save-every 10 --checkpoint all.state -o out.exr --tasks 4 ";
   const Run run = braidRun(folder, options + "--format make --program 'my braid'");
   INFO(run.err);
@@ -385,8 +385,9 @@ TEST_CASE("Every option given to plan is carried on, and none that a share or th
       run.out.substr(run.out.find("share0:\n"), run.out.find("share1:\n") - run.out.find("share0:\n"));
   for (const char* text :
        {"'my braid' render ", " --size=26x17 ", " --yfov=40 ", " --light-scale=2 ", " --no-default-light ",
-        " --sampler=independent ", " --quarters ", " --aovs=features ", " --save-every=10 ", " --quiet ",
-        " --combine=uncorrelated,curves ", " --biased=box ", " --resume ", " --passes=0:2 ", " --history "})
+        " --sampler=independent ", " --quarters ", " --light-parts ", " --aovs=features ", " --save-every=10 ",
+        " --quiet ", " --combine=auto,uncorrelated,curves ", " --biased=box ", " --resume ", " --passes=0:2 ",
+        " --history "})
     CHECK_MESSAGE(contains(share, text), text);
   for (const char* text : {"--spp", "--exposure", "--float", "--tasks", "--format", "--output"})
     CHECK_MESSAGE(!contains(share, text), text);

@@ -26,7 +26,7 @@ TEST_CASE("memory limits: sizes are read with their units") {
 
 TEST_CASE("memory limits: what the plan exceeds is refused before rendering, by name") {
   const Folder folder;
-  for (const auto& [methods, most] : {std::pair("js@nfor", "combining"), {"auto", "combining"}, {"none", "film"}}) {
+  for (const auto& [methods, most] : {std::pair("js@nfor", "combining"), {"auto", "film"}, {"none", "film"}}) {
     const Run run = braidRun(
         folder, "render " + kScene + "--size 4096x2160 --combine " + methods + " -o out.exr --memory-limit 1G");
     CHECK(run.code == 5);

@@ -197,6 +197,16 @@ TEST_CASE("What no method reads is not copied") {
   Estimates alone = all;
   alone.estimates.resize(1);
   CHECK_FALSE(planesRead(makeRecipe(factsOf(alone), {"auto"}, {})).quarters);
+  CHECK_FALSE(planesRead(makeRecipe(factsOf(alone), {"auto"}, {})).lightParts);
+  Estimate& e = alone.estimates[0];
+  e.direct = {e.mean, {e.half[0], e.half[1]}, e.variance};
+  e.indirectVariance = e.variance;
+  CHECK(planesRead(makeRecipe(factsOf(alone), {"auto"}, {})).lightParts);
+  CHECK_FALSE(planesRead(makeRecipe(factsOf(alone), {"js@pw"}, {})).lightParts);
+  CHECK(normalised(alone, 1, report, {true, true, true, true, true, false}).estimates[0].direct.mean.empty());
+  const Estimate doubled = normalised(alone, 2, report).estimates[0];
+  CHECK(doubled.direct.half[1][0][5] == 2 * e.half[1][0][5]);
+  CHECK(doubled.indirectVariance[2][7] == 4 * e.variance[2][7]);
 }
 
 TEST_CASE("Estimates fill their roles, and names override the rules") {

@@ -44,7 +44,7 @@ Settings everythingKept(const std::string& names, uint64_t spp) {
     s.integrators.clear();
     for (const Integrator* i : integrators()) s.integrators.push_back(i->name());
   }
-  s.features = s.quarters = s.transparent = s.history = true;
+  s.features = s.quarters = s.transparent = s.history = s.lightParts = true;
   return s;
 }
 
@@ -100,6 +100,12 @@ void checkSame(const FilmState& a, const FilmState& b, bool history = true) {
     CHECK(sameBits(x.sums.sumOfSquares(), y.sums.sumOfSquares()));
     CHECK(sameBits(x.sums.biasSum(), y.sums.biasSum()));
     CHECK(sameBits(x.sums.biasSumOfSquares(), y.sums.biasSumOfSquares()));
+    REQUIRE(x.parts.has_value() == y.parts.has_value());
+    if (x.parts) {
+      CHECK(sameBits(x.parts->direct().sums(), y.parts->direct().sums()));
+      CHECK(sameBits(x.parts->direct().sumOfSquares(), y.parts->direct().sumOfSquares()));
+      CHECK(sameBits(x.parts->indirectSumOfSquares(), y.parts->indirectSumOfSquares()));
+    }
     CHECK(x.sums.rejected() == y.sums.rejected());
     CHECK(x.sums.clampedSplats() == y.sums.clampedSplats());
     for (int k = 0; k < a.buckets; ++k) CHECK(x.sums.passesInBucket(k) == y.sums.passesInBucket(k));
@@ -147,13 +153,13 @@ constexpr size_t kTinyPixels = 4 * 2;
 // The bytes of a state with another header: sizes and checksum are made to fit again.
 std::string withHeader(const std::string& bytes, const std::string& from, const std::string& to) {
   unsigned long long headerBytes = 0, planeBytes = 0;
-  std::sscanf(bytes.c_str(), "braid-state 1 %llu %llu", &headerBytes, &planeBytes);
+  std::sscanf(bytes.c_str(), "braid-state 2 %llu %llu", &headerBytes, &planeBytes);
   const size_t begin = bytes.find('\n') + 1;
   std::string header = bytes.substr(begin, headerBytes);
   const size_t at = header.find(from);
   REQUIRE_MESSAGE(at != std::string::npos, from);
   header.replace(at, from.size(), to);
-  const std::string first = "braid-state 1 " + std::to_string(header.size()) + ' ' + std::to_string(planeBytes) + '\n';
+  const std::string first = "braid-state 2 " + std::to_string(header.size()) + ' ' + std::to_string(planeBytes) + '\n';
   const std::string planes = bytes.substr(begin + headerBytes, planeBytes);
   ContentHash hash;  // by the steps of the writer: one for each plane
   hash.add(first);
@@ -199,6 +205,9 @@ TEST_CASE("A render resumed from a file is the render that was not interrupted, 
     for (size_t i = 0; i < a.estimates.size(); ++i) {
       CHECK(sameBits(a.estimates[i].mean, b.estimates[i].mean));
       CHECK(sameBits(a.estimates[i].variance, b.estimates[i].variance));
+      CHECK(sameBits(a.estimates[i].direct.variance, b.estimates[i].direct.variance));
+      CHECK(sameBits(a.estimates[i].indirectVariance, b.estimates[i].indirectVariance));
+      CHECK(a.estimates[i].direct.mean.empty() == (a.estimates[i].name != "pt"));
       CHECK(a.estimates[i].quarter.size() == 4);
     }
   }
@@ -254,6 +263,12 @@ TEST_CASE("Shares of the passes add up to the whole, for every integrator") {
       CHECK(a.sums.passesInBucket(static_cast<int>(k)) == b.sums.passesInBucket(static_cast<int>(k)));
     }
     CHECK(farthest(a.sums.sumOfSquares(), b.sums.sumOfSquares()) < 1e-14);
+    REQUIRE(a.parts.has_value() == b.parts.has_value());
+    if (a.parts) {
+      for (size_t k = 0; k < 4; ++k) CHECK(sameBits(a.parts->direct().sums()[k], b.parts->direct().sums()[k]));
+      CHECK(farthest(a.parts->direct().sumOfSquares(), b.parts->direct().sumOfSquares()) < 1e-14);
+      CHECK(farthest(a.parts->indirectSumOfSquares(), b.parts->indirectSumOfSquares()) < 1e-14);
+    }
     if (a.sums.keepsBias()) {
       CHECK(farthest(a.sums.biasSum(), b.sums.biasSum()) < 1e-13);
       CHECK(farthest(a.sums.biasSumOfSquares(), b.sums.biasSumOfSquares()) < 1e-14);
@@ -396,9 +411,9 @@ TEST_CASE("Cut, damaged and foreign files are refused, never believed") {
   CHECK(contains(refusalOf(""), "is no state of braid"));
   CHECK(contains(refusalOf(std::string(100000, '\0')), "is no state of braid"));
   CHECK(contains(refusalOf("\x89PNG\r\n\x1a\n"), "is no state of braid"));
-  CHECK(contains(refusalOf("braid-state 2 10 10\n"), "has state format 2"));
-  CHECK(contains(refusalOf("braid-state 1 18446744073709551615 18446744073709551615\n"), "damaged"));
-  CHECK(contains(refusalOf("braid-state 1 -1 5\n"), "damaged"));
+  CHECK(contains(refusalOf("braid-state 1 10 10\n"), "has state format 1"));
+  CHECK(contains(refusalOf("braid-state 2 18446744073709551615 18446744073709551615\n"), "damaged"));
+  CHECK(contains(refusalOf("braid-state 2 -1 5\n"), "damaged"));
   CHECK(contains(refusal(folder.path / "none.state"), "does not exist"));
   CHECK(contains(refusal(folder.path), "is not a file"));
   CHECK(contains(refusal("/dev/zero"), "is not a file"));

@@ -38,7 +38,8 @@ EstimateFacts plannedEstimate(const PlannedIntegrator& p, uint64_t rounds) {
           passes == 0 || passes >= 4,
           checkpoints,
           {},
-          p.integrator->estimatesBias()};
+          p.integrator->estimatesBias(),
+          p.integrator->separatesDirectLight()};
 }
 
 }  // namespace
@@ -49,6 +50,7 @@ Facts plannedFacts(const Plan& plan, uint64_t samples) {
   for (const PlannedIntegrator& p : plan.integrators) {
     EstimateFacts e = plannedEstimate(p, samples);
     e.quarters = e.quarters && plan.buckets == 4;
+    e.lightParts = e.lightParts && plan.lightParts;
     if (!plan.settings.history) e.checkpoints = 0;
     for (const uint64_t stop : plan.settings.stops)
       if (e.unbiased && (samples == 0 || stop < e.passes)) e.kept.push_back(stop);
@@ -110,7 +112,7 @@ Recipe planCombining(const CombineChoice& choice, uint64_t samples, Plan& plan) 
   for (const PlannedIntegrator& p : plan.integrators) facts.estimates.push_back(plannedEstimate(p, samples));
   Recipe recipe = makeRecipe(facts, choice.wanted(), choice.options().roles);
   const RecipeNeeds needs = needsOf(recipe);
-  keepAlso({needs.quarters, needs.features, needs.checkpoints > 0, needs.stops}, plan);
+  keepAlso({needs.quarters, needs.features, needs.checkpoints > 0, needs.lightParts, needs.stops}, plan);
   return recipe;
 }
 

@@ -78,6 +78,10 @@ std::vector<Checkpoint> readHistory(const ImageFile& file, const std::string& la
   return history;
 }
 
+bool isComplete(const LightPart& p) {
+  return !p.mean.empty() && !p.half[0].empty() && !p.half[1].empty() && !p.variance.empty();
+}
+
 Estimate readEstimate(const ImageFile& file, const std::string& layer, const std::string& name) {
   Estimate e;
   e.name = name;
@@ -87,6 +91,11 @@ Estimate readEstimate(const ImageFile& file, const std::string& layer, const std
   e.variance = layerOrNone(file, layer + ".variance");
   e.bias = layerOrNone(file, layer + ".bias");
   e.biasVariance = layerOrNone(file, layer + ".biasVariance");
+  LightPart direct{layerOrNone(file, layer + ".direct"),
+                   {layerOrNone(file, layer + ".directA"), layerOrNone(file, layer + ".directB")},
+                   layerOrNone(file, layer + ".directVariance")};
+  e.indirectVariance = layerOrNone(file, layer + ".indirectVariance");
+  if (isComplete(direct) && !e.indirectVariance.empty()) e.direct = std::move(direct);
   for (int q = 0; q < 4; ++q)
     if (const std::string quarter = layer + ".q" + std::to_string(q); hasLayer(file, quarter))
       e.quarter.push_back(file.rgb(quarter));

@@ -57,6 +57,8 @@ void addImageOptions(CLI::App& command, ImageOutput& o) {
   command.add_option("--exposure", o.exposure, "Exposure of the PNG in stops")->capture_default_str();
   command.add_option("--aovs", o.aovs, "Layers besides the image: none, features or all")->capture_default_str();
   command.add_flag("--quarters", o.quarters, "Also write the four quarter buffers");
+  command.add_flag("--light-parts", o.lightParts,
+                   "Also write direct light by itself and both parts' variances, for combining later");
   command.add_flag("--history", o.history, "Also write the variances after 1, 2, 4, ... samples, for combining later");
   command.add_flag("--float", o.floatHeadline, "R G B as 32-bit floats");
   command.add_option("--layer-prefix", o.layerPrefix, "Put before every layer's name, e.g. ViewLayer");
@@ -128,6 +130,7 @@ WrittenImage writeImage(const ImageOutput& o, Estimates& estimates, const Plane<
     exr.history = o.history;
     exr.aovs = parseAovs(o.aovs);
     exr.quarters = o.quarters;
+    exr.lightParts = o.lightParts;
     exr.floatHeadline = o.floatHeadline;
     exr.layerPrefix = o.layerPrefix;
     written.warnings = combineWarnings(combined);

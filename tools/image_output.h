@@ -29,7 +29,7 @@ struct ImageOutput {
   std::string exr, png;  // empty: not written
   std::string aovs = "all", layerPrefix;
   double exposure = 0;
-  bool quarters = false, history = false, floatHeadline = false, noTiming = false;
+  bool quarters = false, history = false, lightParts = false, floatHeadline = false, noTiming = false;
   CombineChoice combine;
   ShowImages show;  // called between combining and writing, if there is one
 

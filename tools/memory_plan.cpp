@@ -75,7 +75,9 @@ MemoryPlan planMemory(const Scene& scene, const Plan& plan, const Recipe& recipe
   const auto pixels = static_cast<uint64_t>(plan.window.width()) * static_cast<uint64_t>(plan.window.height());
   const Facts facts = plannedFacts(plan, samples);
   const MemoryItem film{"film", pixels * (plan.filmBytesPerPixel + historyBytes(facts))};
-  const MemoryItem copy{"the copy that is published", pixels * static_cast<uint64_t>(estimatesMemory(facts))};
+  // The sums of indirect light are made for its variance.
+  const uint64_t rest = plan.lightParts ? 24 * static_cast<uint64_t>(plan.buckets) : 0;
+  const MemoryItem copy{"the copy that is published", pixels * (static_cast<uint64_t>(estimatesMemory(facts)) + rest)};
   const int threads = plan.settings.threads > 0 ? plan.settings.threads : machineThreads();
   const MemoryItem combining{"combining", pipelineMemory(recipe, facts, pixels, threads)};
   const MemoryItem writing{"writing", writingBytes(plan, facts)};

@@ -62,7 +62,8 @@ void requireOneKind(const FilmState& a, const FilmState& b, const std::string& f
               a.features.has_value() == b.features.has_value() && a.coverage.has_value() == b.coverage.has_value();
   for (size_t i = 0; same && i < a.estimates.size(); ++i)
     same = a.estimates[i].name == b.estimates[i].name &&
-           a.estimates[i].sums.keepsBias() == b.estimates[i].sums.keepsBias();
+           a.estimates[i].sums.keepsBias() == b.estimates[i].sums.keepsBias() &&
+           a.estimates[i].parts.has_value() == b.estimates[i].parts.has_value();
   if (!same) throw Error(ExitCode::BadInput, file + ": what it holds is not what its options say: use another copy");
 }
 

@@ -68,13 +68,14 @@ FarmJob farmJob(const PlanOptions& o, const Settings& planned) {
   job.tasks = o.tasks;
   job.threads = o.samples.threads;
   carry(o.renderOptions, {"spp", "threads"}, job.render);
-  carry(
-      o.imageOptions,
-      {"output", "png", "exposure", "aovs", "quarters", "history", "float", "layer-prefix", "weights", "reproducible"},
-      job.render);
+  carry(o.imageOptions,
+        {"output", "png", "exposure", "aovs", "quarters", "history", "light-parts", "float", "layer-prefix", "weights",
+         "reproducible"},
+        job.render);
   if (o.transparent) job.render.push_back({"--transparent", std::nullopt});
   if (!o.saveEvery.empty()) job.render.push_back({"--save-every", o.saveEvery});
   if (planned.quarters) job.render.push_back({"--quarters", std::nullopt});
+  if (planned.lightParts) job.render.push_back({"--light-parts", std::nullopt});
   if (planned.history) job.render.push_back({"--history", std::nullopt});
   job.render.push_back({"--aovs", planned.features ? "features" : "none"});
   carry(o.imageOptions, {"output"}, job.merge);
@@ -100,6 +101,7 @@ int runPlan(const PlanOptions& o) {
   settings.features = parseAovs(o.image.aovs) != AovSet::None;
   settings.quarters = o.image.quarters;
   settings.history = o.image.history;
+  settings.lightParts = o.image.lightParts;
   settings.transparent = o.transparent;
   if (o.tasks > 0) splitPasses(settings.spp, o.tasks);  // wrong numbers before the scene is loaded
   SceneData data = loadScene(o.scene);

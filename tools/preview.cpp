@@ -50,6 +50,7 @@ Settings previewSettings(const PreviewOptions& o) {
   settings.features = parseAovs(o.image.aovs) != AovSet::None;
   settings.quarters = o.image.quarters;
   settings.history = o.image.history;
+  settings.lightParts = o.image.lightParts;
   return settings;
 }
 

@@ -62,6 +62,7 @@ Settings renderSettings(const RenderOptions& o) {
   settings.features = parseAovs(o.image.aovs) != AovSet::None;
   settings.quarters = o.image.quarters;
   settings.history = o.image.history;
+  settings.lightParts = o.image.lightParts;
   settings.transparent = o.transparent;
   if (o.error > 0 && o.samples.spp == 0 && o.samples.time.empty()) settings.spp = 0;
   if (o.passes.empty()) return settings;
@@ -99,6 +100,7 @@ void keepAsBefore(const FilmState& state, Settings& settings) {
   settings.features |= state.features.has_value();
   for (const StateOption& option : state.identity.options)
     settings.history |= option == StateOption{"keeping history", "on"};
+  for (const EstimateState& e : state.estimates) settings.lightParts |= e.parts.has_value();
   settings.stops = stopsOf(state.identity);
 }
 

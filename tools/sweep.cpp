@@ -170,6 +170,7 @@ std::vector<SweepJob> Sweep::jobsOf(const std::string& scene) const {
           job.features = job.features || method.features;
           job.quarters = job.quarters || method.quarters;
           job.history = job.history || method.history;
+          job.lightParts = job.lightParts || method.lightParts;
           job.stops.insert(job.stops.end(), method.stops.begin(), method.stops.end());
           cell.method = method.name;
           for (double rung : l.rungs) {

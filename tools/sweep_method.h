@@ -35,8 +35,8 @@ struct SweepMethod {
   // The first one is the estimate that the method improves: its passes are the row's spp, and pixels count as better
   // or worse than its mean.
   std::vector<MethodShare> inputs;
-  bool features = false, quarters = false, history = false;  // what the estimates must hold
-  std::vector<uint64_t> stops;                               // passes at which they keep their image
+  bool features = false, quarters = false, history = false, lightParts = false;  // what the estimates must hold
+  std::vector<uint64_t> stops;  // passes at which they keep their image
   std::function<MethodImage(const std::shared_ptr<const Estimates>&, const Rgb<float>& reference)> finish;
 };
 

@@ -28,6 +28,8 @@ EstimateFacts factsOf(const Integrator& integrator) {
   facts.correlation = integrator.correlation();
   facts.quarters = true;
   facts.checkpoints = 1 << 20;
+  facts.bias = integrator.estimatesBias();
+  facts.lightParts = integrator.separatesDirectLight();
   return facts;
 }
 
@@ -176,6 +178,7 @@ std::vector<SweepMethod> sweepMethods(const std::vector<std::string>& names, con
     method.inputs = parsed.inputs;
     method.features = parsed.needs.features;
     method.quarters = parsed.needs.quarters;
+    method.lightParts = parsed.needs.lightParts;
     method.history = parsed.needs.checkpoints > 0;
     method.stops = parsed.needs.stops;
     method.finish = [pipeline, wanted = parsed.method](const std::shared_ptr<const Estimates>& estimates,

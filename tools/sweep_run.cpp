@@ -75,6 +75,7 @@ Plan planOf(const SweepScene& scene, Settings settings, const SweepJob& job,
   settings.features = job.features;
   settings.quarters = job.quarters;
   settings.history = job.history;
+  settings.lightParts = job.lightParts;
   settings.stops = job.stops;
   std::sort(settings.stops.begin(), settings.stops.end());
   settings.stops.erase(std::unique(settings.stops.begin(), settings.stops.end()), settings.stops.end());

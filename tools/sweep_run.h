@@ -54,7 +54,7 @@ struct SweepJob {
   };
   std::vector<Cell> cells;
   // What the estimates hold: by all methods of the group, done or not, so that a resumed job adds up the same buckets.
-  bool features = false, quarters = false, history = false;
+  bool features = false, quarters = false, history = false, lightParts = false;
   std::vector<uint64_t> stops;
 
   double lastMark() const;

@@ -46,6 +46,8 @@ struct Needs {
   bool anyBases = false;
   bool quarters = false;      // of the unbiased (and the correlated) estimate
   bool quartersHelp = false;  // reads few of their values, MethodInputs::quarters; works without, but worse
+  // Of the unbiased estimate, unless photon maps are among the bases; works without, but worse.
+  bool lightPartsHelp = false;
   bool features = false;      // works without, but worse
   bool featureNoise = false;  // of the features not only the means, also halves and variances
   int checkpoints = 0;

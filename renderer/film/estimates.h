@@ -26,6 +26,11 @@ struct EstimateHead {
   uint64_t rejected = 0;
 };
 
+// Mean, halves and variance of the mean of a part of an estimate's light.
+struct LightPart {
+  Rgb<float> mean, half[2], variance;
+};
+
 // One integrator's image so far.
 struct Estimate : EstimateHead {
   Rgb<float> mean;
@@ -34,6 +39,11 @@ struct Estimate : EstimateHead {
   Rgb<float> variance;              // of the mean; empty when not known
   // Of integrators that estimate their bias: the mean estimate and the variance of that mean; else empty.
   Rgb<float> bias, biasVariance;
+  // Of integrators that tell two parts of the light apart, where these are kept; else empty. Direct light comes
+  // straight from lights to the first non-specular vertex of the camera's path, or to the camera, there perhaps by
+  // specular vertices. The rest is indirect: mean and halves are differences, only the variance is not.
+  LightPart direct;
+  Rgb<float> indirectVariance;
 };
 
 // The state of an estimate at an earlier time, for methods that look at convergence.

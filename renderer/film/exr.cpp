@@ -71,14 +71,21 @@ void addFeature(ChannelList& channels, const std::string& layer, const N& names,
   channels.add(layer + "Variance", names, f.variance);
 }
 
-void addEstimate(ChannelList& channels, const Estimate& e, bool quarters) {
+void addEstimate(ChannelList& channels, const Estimate& e, const ExrOptions& options) {
   channels.add(e.name + ".mean", kColour, e.mean);
   channels.add(e.name + ".halfA", kColour, e.half[0]);
   channels.add(e.name + ".halfB", kColour, e.half[1]);
   channels.add(e.name + ".variance", kColour, e.variance);
   channels.add(e.name + ".bias", kColour, e.bias);
   channels.add(e.name + ".biasVariance", kColour, e.biasVariance);
-  if (!quarters) return;
+  if (options.lightParts) {
+    channels.add(e.name + ".direct", kColour, e.direct.mean);
+    channels.add(e.name + ".directA", kColour, e.direct.half[0]);
+    channels.add(e.name + ".directB", kColour, e.direct.half[1]);
+    channels.add(e.name + ".directVariance", kColour, e.direct.variance);
+    channels.add(e.name + ".indirectVariance", kColour, e.indirectVariance);
+  }
+  if (!options.quarters) return;
   for (size_t q = 0; q < e.quarter.size(); ++q) channels.add(e.name + ".q" + std::to_string(q), kColour, e.quarter[q]);
 }
 
@@ -100,7 +107,7 @@ std::vector<ExrChannel> namedPlanes(const Estimates& estimates, const Rgb<float>
   }
   if (!all) return channels.list();
   for (const Estimate& e : estimates.estimates) {
-    addEstimate(channels, e, options.quarters);
+    addEstimate(channels, e, options);
     const auto history = estimates.history.find(e.name);
     if (!options.history || history == estimates.history.end()) continue;
     for (const Checkpoint& c : history->second) {

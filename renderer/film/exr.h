@@ -25,6 +25,7 @@ struct ExrLayer {
 struct ExrOptions {
   AovSet aovs = AovSet::All;
   bool quarters = false;         // also <estimate>.q0 … q3
+  bool lightParts = false;       // also <estimate>.direct, directA, directB, directVariance, indirectVariance
   bool history = false;          // also <estimate>.variance1, variance2, variance4, …: after so many passes,
                                  // and mean1, halfA1, halfB1, … where they are kept
   bool floatHeadline = false;    // R G B as float instead of half

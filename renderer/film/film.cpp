@@ -47,12 +47,13 @@ void commitRow(const float* __restrict own, const int64_t* __restrict splats, do
 
 }  // namespace
 
-PassTarget::PassTarget(int width, int height, bool splats, bool features, bool coverage, bool bias)
+PassTarget::PassTarget(int width, int height, bool splats, bool features, bool coverage, bool bias, bool direct)
     : width_(width), height_(height), own_(width, height) {
   if (splats) splats_.assign(3 * own_.size(), 0);
   if (features) features_.assign(FeatureSample::kComponents, Plane<float>(width, height));
   if (coverage) coverage_ = Plane<float>(width, height);
   if (bias) bias_ = Rgb<float>(width, height);
+  if (direct) direct_ = Rgb<float>(width, height);
 }
 
 bool PassTarget::add(int x, int y, const Spectrum& value) {
@@ -115,15 +116,19 @@ void PassTarget::bias(int x, int y, const Spectrum& value) {
   if (!ok) rejected_.fetch_add(1, std::memory_order_relaxed);
 }
 
+void PassTarget::direct(int x, int y, const Spectrum& value) {
+  direct_.set(own_[0].index(x, y), acceptable(value) ? value : Spectrum(0));
+}
+
 void PassTarget::clear() {
   const auto width = static_cast<size_t>(width_);
   parallelRows(height_, [&](int y) {
     const size_t begin = static_cast<size_t>(y) * width;
     for (size_t c = 0; c < 3; ++c) std::fill_n(own_[c].data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
     for (Plane<float>& f : features_) std::fill_n(f.data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
-    if (!bias_.empty())
-      for (Plane<float>& b : bias_.channel)
-        std::fill_n(b.data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
+    for (Rgb<float>* image : {&bias_, &direct_})
+      for (Plane<float>& p : image->channel)
+        if (!p.empty()) std::fill_n(p.data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
     if (!coverage_.empty()) std::fill_n(coverage_.data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
     if (!splats_.empty()) std::fill_n(splats_.begin() + static_cast<std::ptrdiff_t>(3 * begin), 3 * width, int64_t(0));
   });
@@ -181,6 +186,19 @@ void Accumulator::commit(uint64_t pass, const PassTarget& target) {
   clampedSplats_ += target.clampedSplats();
 }
 
+void Accumulator::commit(uint64_t pass, const Rgb<float>& values) {
+  BRAID_ASSERT(values.width() == width_ && values.height() == height_);
+  const size_t bucket = pass % count_.size();
+  const auto width = static_cast<size_t>(width_);
+  parallelRows(height_, [&](int y) {
+    const size_t begin = static_cast<size_t>(y) * width;
+    for (size_t c = 0; c < 3; ++c)
+      commitRow(values[c].data.data() + begin, sum_[bucket][c].data.data() + begin, sumsq_[c].data.data() + begin,
+                width);
+  });
+  ++count_[bucket];
+}
+
 void Accumulator::commitBias(const PassTarget& target) {
   BRAID_ASSERT(target.wantsBias());
   const auto width = static_cast<size_t>(width_);
@@ -212,8 +230,7 @@ Rgb<float> Accumulator::biasVariance() const {
   Rgb<float> out(biasSum_.width(), biasSum_.height());
   for (size_t c = 0; c < 3; ++c)
     parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i)
-        out[c][i] = floatVarianceOfMean(biasSum_[c][i], biasSumsq_[c][i], passes());
+      for (size_t i = begin; i < end; ++i) out[c][i] = floatVarianceOfMean(biasSum_[c][i], biasSumsq_[c][i], passes());
     });
   return out;
 }

@@ -37,13 +37,15 @@ struct FeatureSample {
 // be called by any thread for any pixel: integer sums commute, so the result does not depend on the order.
 class PassTarget {
  public:
-  PassTarget(int width, int height, bool splats, bool features, bool coverage = false, bool bias = false);
+  PassTarget(int width, int height, bool splats, bool features, bool coverage = false, bool bias = false,
+             bool direct = false);
 
   int width() const { return width_; }
   int height() const { return height_; }
   bool wantsFeatures() const { return !features_.empty(); }
   bool wantsCoverage() const { return !coverage_.empty(); }
   bool wantsBias() const { return !bias_.empty(); }
+  bool wantsDirect() const { return !direct_.empty(); }
 
   // Sets the value of the task's own pixel in this pass. A non-finite or negative value counts as a sample of value 0
   // and is counted as rejected; returns false then.
@@ -64,6 +66,9 @@ class PassTarget {
   // The estimated bias of this pass' value of the pixel, of either sign; only when wantsBias(). A non-finite one counts
   // as 0 and as rejected.
   void bias(int x, int y, const Spectrum& value);
+  // The direct part of the value that add() was given (Estimate::direct); only when wantsDirect(). A value that add()
+  // would reject counts as 0.
+  void direct(int x, int y, const Spectrum& value);
 
   // Zeroes everything, for the next pass; keeps the allocation.
   void clear();
@@ -74,6 +79,7 @@ class PassTarget {
   friend class Accumulator;
   friend class FeatureAccumulator;
   friend class CoverageAccumulator;
+  friend class LightPartsAccumulator;
 
   int width_, height_;
   Rgb<float> own_;
@@ -81,6 +87,7 @@ class PassTarget {
   std::vector<Plane<float>> features_;  // FeatureSample::kComponents planes, or empty
   Plane<float> coverage_;               // or empty
   Rgb<float> bias_;                     // or empty
+  Rgb<float> direct_;                   // or empty
   double splatScale_ = 4294967296.0;    // fixed-point units per 1
   double splatClamp_ = 4194304.0;
   std::atomic<uint64_t> rejected_{0}, clampedSplats_{0};
@@ -94,6 +101,8 @@ class Accumulator {
 
   // Adds the pass: v = own + splats, sum[pass % K] += v, sumsq += v²; likewise the bias. Parallel over rows.
   void commit(uint64_t pass, const PassTarget& target);
+  // The same of one plane of values a pass.
+  void commit(uint64_t pass, const Rgb<float>& values);
 
   int width() const { return width_; }
   int height() const { return height_; }

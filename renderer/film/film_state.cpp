@@ -53,6 +53,10 @@ Estimate estimateOf(const EstimateState& state, bool quarters) {
     estimate.bias = a.biasMean();
     estimate.biasVariance = a.biasVariance();
   }
+  if (state.parts) {
+    estimate.direct = state.parts->directPart(state.lowDiscrepancy);
+    estimate.indirectVariance = state.parts->indirectVariance(a, state.lowDiscrepancy);
+  }
   return estimate;
 }
 
@@ -190,7 +194,9 @@ void addShare(FilmState& state, const FilmState& next) {
     const EstimateState& n = next.estimates[i];
     BRAID_ASSERT(e.name == n.name);
     if (!e.history.empty() && e.history.back().passes < e.sums.passes()) e.keepCheckpoint(stopsOf(state.identity));
+    BRAID_ASSERT(e.parts.has_value() == n.parts.has_value());
     e.sums.add(n.sums);
+    if (e.parts) e.parts->add(*n.parts);
     e.seconds += n.seconds;
     e.passes.insert(e.passes.end(), n.passes.begin(), n.passes.end());
     normalise(e.passes);

@@ -19,7 +19,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "state files hold the planes as they lie in memory");
 
 constexpr char kMagic[] = "braid-state";
-constexpr int kFormat = 1;
+constexpr int kFormat = 2;
 constexpr uint64_t kMaxHeader = 16 << 20;
 constexpr size_t kFirstLine = 64;      // at most
 constexpr size_t kChecksumBytes = 17;  // 16 digits and a newline
@@ -36,6 +36,11 @@ void forEachPlane(const FilmState& state, const Visit& visit) {
     if (e.sums.keepsBias()) {
       colour(e.sums.biasSum());
       colour(e.sums.biasSumOfSquares());
+    }
+    if (e.parts) {
+      for (const Rgb<double>& sum : e.parts->direct().sums()) colour(sum);
+      colour(e.parts->direct().sumOfSquares());
+      colour(e.parts->indirectSumOfSquares());
     }
     for (const Checkpoint& c : e.history)
       for (const Rgb<float>* image : {&c.variance, &c.mean, &c.half[0], &c.half[1]})
@@ -142,15 +147,23 @@ Rgb<T> readColour(Reader& in, const FilmState& state) {
   return planes;
 }
 
-void readEstimate(Reader& in, const FilmState& state, const EstimateLayout& layout, EstimateState& e) {
+Accumulator readSums(Reader& in, const FilmState& state, const EstimateLayout& layout) {
   std::vector<Rgb<double>> sums;
   for (int k = 0; k < state.buckets; ++k) sums.push_back(readColour<double>(in, state));
   Rgb<double> squares = readColour<double>(in, state);
-  e.sums =
-      Accumulator::fromSums(std::move(sums), std::move(squares), layout.counts, layout.rejected, layout.clampedSplats);
+  return Accumulator::fromSums(std::move(sums), std::move(squares), layout.counts, layout.rejected,
+                               layout.clampedSplats);
+}
+
+void readEstimate(Reader& in, const FilmState& state, const EstimateLayout& layout, EstimateState& e) {
+  e.sums = readSums(in, state, layout);
   if (layout.bias) {
     Rgb<double> bias = readColour<double>(in, state);
     e.sums.setBiasSums(std::move(bias), readColour<double>(in, state));
+  }
+  if (layout.parts) {
+    Accumulator direct = readSums(in, state, layout);
+    e.parts = LightPartsAccumulator::fromSums(std::move(direct), readColour<double>(in, state));
   }
   for (size_t k = 0; k < e.history.size(); ++k) {
     Checkpoint& c = e.history[k];

@@ -153,9 +153,9 @@ Attribute parseAttribute(Line& line) {
 
 std::string estimateLines(const EstimateState& e, const EstimateLayout& layout) {
   std::string text =
-      fmt::format("estimate {} {:d} {} {:d} {} {} {} {} {:d}\ncounts {}\npasses", escaped(e.name), e.unbiased,
+      fmt::format("estimate {} {:d} {} {:d} {} {} {} {} {:d} {:d}\ncounts {}\npasses", escaped(e.name), e.unbiased,
                   static_cast<int>(e.correlation), e.lowDiscrepancy, e.passesPerRound, e.seconds, layout.rejected,
-                  layout.clampedSplats, layout.bias, fmt::join(layout.counts, " "));
+                  layout.clampedSplats, layout.bias, layout.parts, fmt::join(layout.counts, " "));
   for (const PassInterval& i : e.passes) text += fmt::format(" {}:{}", i.begin, i.end);
   text += '\n';
   for (const Checkpoint& c : e.history)
@@ -176,6 +176,7 @@ void parseEstimate(Line& line, FilmState& state, StateLayout& layout) {
   l.rejected = line.count(~uint64_t(0));
   l.clampedSplats = line.count(~uint64_t(0));
   l.bias = line.flag();
+  l.parts = line.flag();
   for (const EstimateState& other : state.estimates)
     if (other.name == e.name) line.fail("the estimate " + e.name + " appears twice");
   state.estimates.push_back(std::move(e));
@@ -284,6 +285,7 @@ StateLayout layoutOf(const FilmState& state) {
     l.rejected = e.sums.rejected();
     l.clampedSplats = e.sums.clampedSplats();
     l.bias = e.sums.keepsBias();
+    l.parts = e.parts.has_value();
     for (const Checkpoint& c : e.history) l.images.push_back(!c.mean.empty());
     layout.estimates.push_back(std::move(l));
   }
@@ -306,6 +308,11 @@ std::vector<PlaneEntry> planeTable(const FilmState& state, const StateLayout& la
     if (layout.estimates[i].bias) {
       colour(e.name + ".bias", 8);
       colour(e.name + ".biasSquares", 8);
+    }
+    if (layout.estimates[i].parts) {
+      for (int k = 0; k < state.buckets; ++k) colour(fmt::format("{}.direct{}", e.name, k), 8);
+      colour(e.name + ".directSquares", 8);
+      colour(e.name + ".indirectSquares", 8);
     }
     for (size_t k = 0; k < e.history.size(); ++k) {
       const std::string passes = std::to_string(e.history[k].passes);

@@ -15,7 +15,7 @@ namespace braid {
 struct EstimateLayout {
   std::vector<uint64_t> counts;  // passes in each bucket
   uint64_t rejected = 0, clampedSplats = 0;
-  bool bias = false;
+  bool bias = false, parts = false;
   std::vector<bool> images;  // whether a checkpoint of the history has its image
 };
 

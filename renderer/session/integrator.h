@@ -65,6 +65,8 @@ class Integrator {
   virtual Correlation correlation() const { return Correlation::Independent; }
   // Whether it estimates the bias of its passes (PassTarget::bias).
   virtual bool estimatesBias() const { return false; }
+  // Whether it tells direct light from the rest (PassTarget::direct). Such an integrator does not splat.
+  virtual bool separatesDirectLight() const { return false; }
   // A pure function of the plan and the scene; null when passes need nothing.
   virtual std::shared_ptr<const Preparation> prepare(const TransportContext&, const Plan&) const { return nullptr; }
   // `reach` says how light gets to what the camera sees (measured only when integrators are chosen automatically).

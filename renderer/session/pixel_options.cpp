@@ -53,7 +53,8 @@ std::vector<StateOption> pixelOptions(const Plan& plan) {
       {"photon aiming", yesOrNo(s.photonAiming)},
       {"keeping quarters", yesOrNo(plan.buckets == 4)},
       {"keeping features", yesOrNo(plan.features)},
-      {"keeping history", yesOrNo(s.history)}};
+      {"keeping history", yesOrNo(s.history)},
+      {"keeping direct light", yesOrNo(plan.lightParts)}};
   for (StateOption& stop : stopOptions(s.stops)) list.push_back(std::move(stop));
   return list;
 }

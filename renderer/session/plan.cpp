@@ -33,7 +33,8 @@ void planIntegrators(const Scene& scene, const Settings& settings, const std::ve
       if (planned) continue;
       // An integrator asked for by name runs even where the scene does not need it; how light reaches what is in view
       // is not measured for it.
-      const Applies applies = name == "auto" ? i->applies(scene.traits(), reach) : Applies{true, "as --integrator says"};
+      const Applies applies =
+          name == "auto" ? i->applies(scene.traits(), reach) : Applies{true, "as --integrator says"};
       const bool kept = applies.yes || settings.full;
       plan.lines.push_back({kept, i->name(), applies.reason});
       if (kept) plan.integrators.push_back({i, 1});
@@ -109,12 +110,20 @@ void planFilm(Plan& plan) {
     plan.filmBytesPerPixel += 48 + (bias ? 0 : 12);
     bias = true;
   }
+  const auto separate = std::count_if(plan.integrators.begin(), plan.integrators.end(),
+                                      [](const auto& p) { return p.integrator->separatesDirectLight(); });
+  plan.lightParts = separate > 0 && (settings.lightParts || settings.full);
+  if (plan.lightParts) plan.filmBytesPerPixel += (accumulator + 24) * static_cast<uint64_t>(separate) + 12;
   plan.lines.push_back(
       {plan.buckets == 4, "quarter buckets",
        plan.buckets == 4 ? "for outputs or combiners" : "no output or combiner reads quarters: two half buffers"});
   plan.lines.push_back({plan.features, "features",
                         plan.features ? "albedo, normal, depth, visibility for outputs or combiners"
                                       : "no output or combiner reads them"});
+  plan.lines.push_back({plan.lightParts, "direct light by itself",
+                        plan.lightParts ? "for outputs or combiners"
+                        : separate == 0 ? "no integrator tells it from the rest"
+                                        : "no output or combiner reads it"});
   plan.lines.push_back({settings.history, "history",
                         settings.history ? fmt::format("variances after rounds 1, 2, 4, ...: {} bytes a pixel each",
                                                        12 * plan.integrators.size())
@@ -160,6 +169,7 @@ void keepAlso(const FilmNeeds& needs, Plan& plan) {
   s.quarters |= needs.quarters;
   s.features |= needs.features;
   s.history |= needs.history;
+  s.lightParts |= needs.lightParts;
   s.stops.insert(s.stops.end(), needs.stops.begin(), needs.stops.end());
   std::sort(s.stops.begin(), s.stops.end());
   s.stops.erase(std::unique(s.stops.begin(), s.stops.end()), s.stops.end());

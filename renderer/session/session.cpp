@@ -23,7 +23,8 @@ PassTarget makeTarget(const Plan& plan) {
     splats = splats || p.integrator->splats();
     bias = bias || p.integrator->estimatesBias();
   }
-  return PassTarget(plan.window.width(), plan.window.height(), splats, plan.features, plan.settings.transparent, bias);
+  return PassTarget(plan.window.width(), plan.window.height(), splats, plan.features, plan.settings.transparent, bias,
+                    plan.lightParts);
 }
 
 }  // namespace
@@ -124,6 +125,7 @@ class Session::Loop {
       result_.firstRejected = {integrator.name(), pass, static_cast<int>(rejected % plan_.settings.width),
                                static_cast<int>(rejected / plan_.settings.width)};
     e.sums.commit(pass, target_);
+    if (e.parts) e.parts->commit(pass, target_);
     e.addPass(pass);
     if (i == 0 && film_.features) film_.features->commit(pass, target_);
     if (i == 0 && film_.coverage) film_.coverage->commit(target_);
@@ -162,6 +164,7 @@ Session::Session(const Scene& scene, Plan plan)
     e.lowDiscrepancy = p.integrator->lowDiscrepancy(plan_.settings);
     e.passesPerRound = p.passesPerRound;
     e.sums = Accumulator(width, height, plan_.buckets, p.integrator->estimatesBias());
+    if (plan_.lightParts && p.integrator->separatesDirectLight()) e.parts.emplace(width, height, plan_.buckets);
     film_.estimates.push_back(std::move(e));
   }
   if (plan_.features) film_.features.emplace(width, height);
@@ -188,8 +191,8 @@ void Session::resume(FilmState state, const std::string& name) {
   for (size_t i = 0; fits && i < film_.estimates.size(); ++i) {
     const EstimateState &there = state.estimates[i], &here = film_.estimates[i];
     fits = there.name == here.name && there.passesPerRound == here.passesPerRound &&
-           there.sums.keepsBias() == here.sums.keepsBias() && there.sums.width() == here.sums.width() &&
-           there.sums.height() == here.sums.height();
+           there.sums.keepsBias() == here.sums.keepsBias() && there.parts.has_value() == here.parts.has_value() &&
+           there.sums.width() == here.sums.width() && there.sums.height() == here.sums.height();
   }
   if (!fits) throw Error(ExitCode::BadInput, name + ": cannot be resumed: what it holds is not what its options say");
   state.attributes = std::move(film_.attributes);
