@@ -355,6 +355,12 @@ TEST_CASE("auto filters direct and indirect light apart, offline as in process")
     combined(folder, "--unbiased " + std::string(file) + " --method auto -o c.exr");
     CHECK(identical(a.rgb("combined.auto"), readImage(folder.path / "c.exr").rgb("combined.auto")));
   }
+  // Parts of one file are not those of two files' mean.
+  for (const char* parts : {"0", "1"})
+    combined(folder,
+             std::string("--unbiased a.exr,b.exr --method auto -o two") + parts + ".exr --auto-light-parts " + parts);
+  CHECK(identical(readImage(folder.path / "two0.exr").rgb("combined.auto"),
+                  readImage(folder.path / "two1.exr").rgb("combined.auto")));
   combined(folder, "--unbiased a.exr --method auto --auto-light-parts 0 -o d.exr");
   CHECK_FALSE(identical(a.rgb("combined.auto"), readImage(folder.path / "d.exr").rgb("combined.auto")));
 }

@@ -242,6 +242,10 @@ Estimates readEstimatesOption(const std::string& text, const ReadOptions& option
   Estimates all = readEstimates(readImage(path), options);
   if (!name.empty()) moveToFront(all, name, path);
   Estimate& first = all.estimates.front();
+  if (files.size() > 1) {  // parts of the light are those of the first file's image
+    first.direct = {};
+    first.indirectVariance = {};
+  }
   if (files.size() == 2) {
     first.half[0] = first.mean;
     first.half[1] = colourLike(files[1], all, options);
