@@ -24,7 +24,7 @@ struct LightPreparation : Preparation {
   };
 };
 
-// Whether photons find light that camera paths find by rare chance only: caustics, or lights behind a gap.
+// Whether photons find light that camera paths find by rare chance only: caustics.
 Applies photonsApply(const SceneTraits& traits, const LightReach& reach);
 
 // Whether light subpaths are worth connecting to camera paths beside a photon map, instead of camera paths alone: where

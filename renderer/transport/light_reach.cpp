@@ -7,7 +7,6 @@
 #include <unordered_map>
 
 #include "renderer/transport/light_emission.h"
-#include "renderer/transport/shadow_ray.h"
 #include "renderer/transport/subpath.h"
 
 namespace braid {
@@ -74,32 +73,14 @@ WalkSettings probeWalk(Transport transport) {
   return settings;
 }
 
-// Whether one light sample at the vertex finds light, hidden by nothing.
-bool seesLight(const TransportContext& context, const SubpathVertex& vertex, const SampleBlock& block) {
-  LightSample light;
-  if (!context.lights.sample(vertex.hit.position, vertex.receiverNormal(), vertex.twoSided, block.u[slot::kLightSelect],
-                             {block.u[slot::kLightU], block.u[slot::kLightV]}, light) ||
-      isBlack(evaluateVertex(context, vertex, Transport::Radiance, light.wi).f))
-    return false;
-  ShadowBatch ray;
-  bool hidden = true;
-  ray.set(0, shadowRay(vertex.hit, light.wi, light.distance, 0));
-  context.scene.accel().occluded(ray, 1, &hidden);
-  return !hidden;
-}
-
 VisibleCells findVisibleCells(const TransportContext& context, const PassSampler& sampler, const Camera& camera,
-                              int width, int height, double& lit) {
+                              int width, int height) {
   VisibleCells cells(camera.position(), 1e-6f * context.scene.traits().radius);
   SubpathBatch batch(context, sampler, probeWalk(Transport::Radiance));
-  double total = 0, found = 0;
   const auto onHit = [&](int, const SubpathState& state, const SubpathVertex& vertex) {
     if (!(state.leastPdfW > kFocusingPdf)) return false;
     if (!vertex.bsdf.hasNonDelta()) return true;
-    const double weight = static_cast<double>(average(vertex.throughput));
-    cells.add(vertex.hit.position, weight);
-    total += weight;
-    if (seesLight(context, vertex, sampler.block(vertex.key, static_cast<unsigned>(vertex.segments)))) found += weight;
+    cells.add(vertex.hit.position, static_cast<double>(average(vertex.throughput)));
     return true;
   };
   for (int first = 0; first < kEyePaths; first += kBatch) {
@@ -114,7 +95,6 @@ VisibleCells findVisibleCells(const TransportContext& context, const PassSampler
     }
     batch.run(onHit, [](int, const SubpathState&) {});
   }
-  lit = total > 0 ? found / total : 0.0;
   return cells;
 }
 
@@ -126,7 +106,7 @@ LightReach measureLightReach(const TransportContext& context, const Camera& came
   const LightEmission emission(scene, context.lights);
   if (emission.empty()) return reach;
   const PassSampler sampler(SamplerKind::Independent, kSeed, 0, 0, 1);
-  const VisibleCells visible = findVisibleCells(context, sampler, camera, width, height, reach.lit);
+  const VisibleCells visible = findVisibleCells(context, sampler, camera, width, height);
   const std::map<uint32_t, double> areas = lampAreas(scene);
   double total = 0;
   const auto onHit = [&](int, const SubpathState& state, const SubpathVertex& vertex) {
@@ -135,7 +115,6 @@ LightReach measureLightReach(const TransportContext& context, const Camera& came
     const double density = visible.density(vertex.hit.position);
     const double value = density * static_cast<double>(average(vertex.throughput * vertex.bsdf.albedo()));
     if (!(value > 0) || !std::isfinite(value)) return true;
-    ++reach.arrivals;
     total += value;
     if (vertex.segments == 1) {
       reach.direct += value;
@@ -169,7 +148,6 @@ LightReach measureLightReach(const TransportContext& context, const Camera& came
     }
     batch.run(onHit, [](int, const SubpathState&) {});
   }
-  reach.paths = kPaths;
   if (total > 0)
     for (double* share : {&reach.direct, &reach.indirect, &reach.caustic, &reach.causticVariance, &reach.unreachable})
       *share /= total;

@@ -11,8 +11,6 @@ namespace braid {
 // Shares of the light that finite and directional lights send to rough surfaces which the camera sees, directly or over
 // mirrors and through glass.
 struct LightReach {
-  uint64_t paths = 0;     // light subpaths traced; 0: there is no such light
-  uint64_t arrivals = 0;  // of them at surfaces in view
   double direct = 0;      // arriving straight from a light
   double indirect = 0;    // after scattering, the last time from a rough surface
   double caustic = 0;     // the last time from a mirror, a lens or another surface that focuses
@@ -20,8 +18,6 @@ struct LightReach {
   // of hitting the light over the focusing surface. 1 is as bad as a signal that one path in two sees.
   double causticVariance = 0;
   double unreachable = 0;  // of the caustics: from points and directions, which no camera path can hit
-  // Share of the camera's view of rough surfaces from where one light sample finds a light unhidden.
-  double lit = 0;
 };
 
 // A pure function of the scene and the camera. Costs about as much as a pass of 128 x 128 pixels.
