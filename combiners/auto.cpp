@@ -44,6 +44,9 @@ constexpr uint64_t kFirstOrderPasses = 64;  // fewer: slopes fit noise
 // The careful filter is for what the wide one takes for noise, which is small: more neighbours than the 49 up to this
 // distance change no error.
 constexpr PatchWelchNeighbours kCarefulNeighbours{4, 4};
+// Of the squared bias that halves show. A filter of a part takes in fewer neighbours that differ as variances fall:
+// half the bias would be left if it took in those within its noise only, all of it if it did not look at noise.
+constexpr double kBiasKeptByParts = 0.85;
 constexpr int kFirstOrderStride = 7;  // with a careful filter beside it, fits every fifth pixel change no error either
 
 class Auto : public Method {
@@ -228,9 +231,10 @@ MethodResult Auto::run(const MethodInputs& in) const {
     if (own->variance.empty()) own->variance = meanVariance(*whole);
   }
   const bool despike = in.options.number(kDespike) != 0 && mayBeMeasured(*whole);
-  std::vector<Estimate> filters;  // of the parts before outliers of the whole are replaced
+  std::vector<Estimate> filters;  // of the parts, before outliers of the whole are replaced
   if (photonMaps.empty() && in.options.number(kLightParts) != 0 && mayBeMeasured(*whole) && hasLightParts(*whole))
     filters = filtersOfParts(*whole, despike, in.features, in.cancel);
+  const double biasKept = filters.empty() ? 1 : kBiasKeptByParts;
   if (despike) {
     const GivenQuarters quarters = photonMaps.empty() ? in.quarters : GivenQuarters{&fused.image.quarter};
     const std::vector<Spike> spikes = findSpikes(*whole, quarters, in.features);
@@ -273,7 +277,7 @@ MethodResult Auto::run(const MethodInputs& in) const {
   if (in.options.number(kSecondPass) != 0) filterAgain(x, in, patchRadius, result);
   if (cancelled()) return result;
   result.error =
-      errorMap(result.image.half, x, fused.noise.empty() ? x.variance : fused.noise, result.image.mean, true);
+      errorMap(result.image.half, x, fused.noise.empty() ? x.variance : fused.noise, result.image.mean, true, biasKept);
   if (!fused.squaredBias.empty()) addTo(result.error, smoothedSquaredBias(fused.squaredBias, result.image.mean));
   return result;
 }

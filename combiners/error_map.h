@@ -35,9 +35,10 @@ Plane<float> squaredErrorSamples(const Rgb<float> (&halves)[2], const Estimate& 
 // The squared bias is that of the halves, which have seen half of the samples. That of an image which shares out
 // between x and something with the squared error b² as their errors ask for it, as James and Stein's does, falls with
 // v: its error is e = v b² / (v + b²), that of a half e' = 2 v b² / (2 v + b²), so that e = e' 2 v / (2 v + e'). With
-// `follows` the squared bias is multiplied by that factor, with means over 15 x 15 pixels.
+// `follows` the squared bias is multiplied by that factor, with means over 15 x 15 pixels; and in any case by `kept`,
+// for filters whose bias falls as they see more samples.
 Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
-                      const Rgb<float>& guide, bool follows = false);
+                      const Rgb<float>& guide, bool follows = false, double kept = 1);
 
 // u max(0, box15(squaredBias / u)), u as above: of unbiased samples of a squared bias, which may be negative.
 Plane<float> smoothedSquaredBias(const Plane<float>& squaredBias, const Rgb<float>& guide);
