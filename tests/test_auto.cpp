@@ -245,6 +245,8 @@ TEST_CASE(
   CHECK(errorMap(halves, x, x.variance, x.mean)[500] == doctest::Approx(measured).epsilon(1e-3));
   CHECK(errorMap(halves, x, x.variance, x.mean, true)[500] ==
         doctest::Approx(measured * 2 * v / (2 * v + b * b)).epsilon(1e-3));
+  CHECK(errorMap(halves, x, x.variance, x.mean, true, 0.5)[500] ==
+        doctest::Approx(0.5 * measured * 2 * v / (2 * v + b * b)).epsilon(1e-3));
   const Estimate exact = flat(1.0f, 0.0f);
   CHECK(errorMap(exact.half, exact, exact.variance, exact.mean, true)[500] == 0);
 }
