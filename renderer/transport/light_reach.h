@@ -11,9 +11,9 @@ namespace braid {
 // Shares of the light that finite and directional lights send to rough surfaces which the camera sees, directly or over
 // mirrors and through glass.
 struct LightReach {
-  double direct = 0;      // arriving straight from a light
-  double indirect = 0;    // after scattering, the last time from a rough surface
-  double caustic = 0;     // the last time from a mirror, a lens or another surface that focuses
+  double direct = 0;    // arriving straight from a light
+  double indirect = 0;  // after scattering, the last time from a rough surface
+  double caustic = 0;   // the last time from a mirror, a lens or another surface that focuses
   // Relative variance that caustics give to one camera path which can only find them by chance: Σ share / probability
   // of hitting the light over the focusing surface. 1 is as bad as a signal that one path in two sees.
   double causticVariance = 0;
