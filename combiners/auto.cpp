@@ -44,10 +44,11 @@ constexpr uint64_t kFirstOrderPasses = 64;  // fewer: slopes fit noise
 // The careful filter is for what the wide one takes for noise, which is small: more neighbours than the 49 up to this
 // distance change no error.
 constexpr PatchWelchNeighbours kCarefulNeighbours{4, 4};
-// Of the squared bias that halves show. A filter of a part takes in fewer neighbours that differ as variances fall:
-// half the bias would be left if it took in those within its noise only, all of it if it did not look at noise.
-constexpr double kBiasKeptByParts = 0.85;
 constexpr int kFirstOrderStride = 7;  // with a careful filter beside it, fits every fifth pixel change no error either
+
+// What images from filters of both parts keep of the squared bias that their halves show, found on the suite (auto.md):
+// less than all, for filters blur less as variances fall, and more than half, for not all bias goes with the variance.
+constexpr double kBiasKeptByParts = 0.85;
 
 class Auto : public Method {
  public:
