@@ -64,7 +64,7 @@ class RecipeMaker {
   std::string fillBases(Step& step, const std::string& chosen);
   bool readsLightParts(const Step& step) const;
   void fillStop(Step& step);
-  std::string defaultBiased(const Needs& needs);
+  std::string defaultBiased(const Step& step, const Needs& needs);
   std::vector<std::string> denoisersInOrder() const;
   std::string lacks(const std::string& estimate, const Needs& needs, bool unbiased) const;
 
@@ -122,13 +122,7 @@ std::string RecipeMaker::lacks(const std::string& name, const Needs& needs, bool
 }
 
 std::string RecipeMaker::fillUnbiased(Step& step) {
-  step.unbiased = options_.unbiased;
-  if (step.unbiased.empty())
-    for (const EstimateFacts& e : facts_.estimates)
-      if (e.unbiased && e.correlation == Correlation::Independent) {
-        step.unbiased = e.name;
-        break;
-      }
+  step.unbiased = options_.unbiased.empty() ? defaultUnbiased(facts_) : options_.unbiased;
   if (step.unbiased.empty()) return "needs an unbiased estimate with independent pixels";
   if (!facts_.find(step.unbiased))
     return fmt::format("needs the unbiased estimate {}, which there is not", step.unbiased);
@@ -163,12 +157,12 @@ std::vector<std::string> RecipeMaker::denoisersInOrder() const {
   return list;
 }
 
-std::string RecipeMaker::defaultBiased(const Needs& needs) {
+std::string RecipeMaker::defaultBiased(const Step& step, const Needs& needs) {
   for (const std::string& name : options_.denoisers)
     if (add(name).empty()) return name;
   if (!needs.redenoise)
     for (const EstimateFacts& e : facts_.estimates)
-      if (!e.unbiased && lacks(e.name, needs, false).empty()) return e.name;
+      if (!e.unbiased && e.name != step.unbiased && lacks(e.name, needs, false).empty()) return e.name;
   for (const std::string& name : denoisersInOrder()) {
     // A trial that leaves no trace of what does not run.
     RecipeMaker trial(facts_, options_);
@@ -181,7 +175,7 @@ std::string RecipeMaker::fillBiased(Step& step, const std::string& chosen) {
   const Needs needs = step.method->needs();
   step.biased = chosen;
   if (step.biased.empty() && !inProgress_.count(options_.biased)) step.biased = options_.biased;
-  if (step.biased.empty()) step.biased = defaultBiased(needs);
+  if (step.biased.empty()) step.biased = defaultBiased(step, needs);
   if (step.biased.empty())
     return needs.redenoise ? "needs a denoiser that can run, for its biased input"
                            : "needs a biased input: a denoiser that can run or a biased estimate";
@@ -219,7 +213,8 @@ std::string RecipeMaker::fillBases(Step& step, const std::string& chosen) {
   }
   if (needs.anyBases)
     for (const EstimateFacts& e : facts_.estimates)
-      if (!e.unbiased && !std::count(step.bases.begin(), step.bases.end(), e.name)) keep(e.name);
+      if (!e.unbiased && e.name != step.unbiased && !std::count(step.bases.begin(), step.bases.end(), e.name))
+        keep(e.name);
   if (static_cast<int>(step.bases.size()) < needs.bases)
     return fmt::format("needs {} to choose from, there {}", plural(static_cast<uint64_t>(needs.bases), "base", "bases"),
                        step.bases.size() == 1 ? "is only " + step.bases[0] : fmt::format("are {}", step.bases.size()));
@@ -315,6 +310,17 @@ Facts factsOf(const Estimates& all) {
                                std::move(kept), !e.bias.empty(), !e.direct.mean.empty()});
   }
   return facts;
+}
+
+std::string defaultUnbiased(const Facts& facts) {
+  const auto first = [&](const auto& fits) {
+    for (const EstimateFacts& e : facts.estimates)
+      if (e.correlation == Correlation::Independent && fits(e)) return e.name;
+    return std::string();
+  };
+  const std::string unbiased = first([](const EstimateFacts& e) { return e.unbiased; });
+  if (!unbiased.empty()) return unbiased;
+  return first([](const EstimateFacts& e) { return e.halves && e.variance && !e.bias && !isMethod(e.name); });
 }
 
 const Step* Recipe::find(const std::string& name) const {

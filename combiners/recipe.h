@@ -12,15 +12,17 @@
 // under that method's name.
 //
 // How the roles are filled:
-//   unbiased    as named, or the first estimate that is unbiased and whose pixels are independent.
+//   unbiased    as named, or the first estimate that is unbiased and whose pixels are independent; if there is none,
+//   the
+//               first whose halves and variance tell its error all the same: vcm's, whose bias is far below its noise.
 //   correlated  as named, or the first estimate that is unbiased and whose pixels are correlated.
 //   biased      after '@', or as named for all; or else the first denoiser asked for; or else the first biased
-//               estimate, but not for methods that run the denoiser again (SURE); or else the first that runs of oidn,
-//               nfor, rdfc, pw, nlm; or else the first other denoiser that runs. Never box, which is input for stress
-//               tests. The named input itself gets the default one when it needs a biased input.
+//               estimate but that, and not for methods that run the denoiser again (SURE); or else the first that runs
+//               of oidn, nfor, rdfc, pw, nlm; or else the first other denoiser that runs. Never box, which is input for
+//               stress tests. The named input itself gets the default one when it needs a biased input.
 //   bases       after '@' with '+' between them, as in ensemble@nfor+rdfc; or as named for all; or else the denoisers
 //               asked for and, when they are too few, all denoisers that run but box; and for methods that want them
-//               the biased estimates.
+//               the other biased estimates.
 //
 // Where denoising stops: a method after its stop, if the image of then was kept, gets a step of its own for its
 // denoiser, called like nfor-stop128, which reads that image; the denoiser does not run on the newest image unless it
@@ -63,6 +65,9 @@ struct Facts {
   const EstimateFacts* find(const std::string& name) const;
 };
 Facts factsOf(const Estimates& estimates);
+
+// The estimate in the role of the unbiased one where no user names it; empty: there is none.
+std::string defaultUnbiased(const Facts& facts);
 
 // One method and its inputs, by name; empty: not used.
 struct Step {

@@ -19,7 +19,7 @@ Facts fullFacts() {
   f.features = f.reference = true;
   f.estimates = {{"pt", true, Correlation::Independent, 64, true, true, true, 7},
                  {"crn", true, Correlation::CommonRandomNumbers, 64, true, true, true, 7},
-                 {"sppm", false, Correlation::Independent, 64, true, true, true, 7}};
+                 {"sppm", false, Correlation::Independent, 64, true, true, true, 7, {}, true}};
   return f;
 }
 
@@ -230,6 +230,21 @@ TEST_CASE("Estimates fill their roles, and names override the rules") {
   named.unbiased = "vcm";
   CHECK(contains(step("inverse-variance", named).obstacle, "vcm, which there is not"));
   CHECK(step("average", boxes()).bases == std::vector<std::string>{"box", "sppm"});
+  // An estimate that is consistent only takes the place where nothing is unbiased, and is no input beside itself.
+  facts.estimates.push_back({"vcm", false, Correlation::Independent, 64, true, true, true, 7});
+  CHECK(step("auto", none).unbiased == "pt");
+  CHECK(step("auto", none).bases == std::vector<std::string>{"sppm", "vcm"});
+  std::erase_if(facts.estimates, [](const EstimateFacts& e) { return e.unbiased; });
+  CHECK(step("auto", none).unbiased == "vcm");
+  CHECK(step("auto", none).bases == std::vector<std::string>{"sppm"});
+  CHECK(step("js", none).biased == "sppm");
+  // Photon maps and images of denoisers never do.
+  facts.estimates.back() = {"nfor", false, Correlation::Independent, 64, true, true, true, 7};
+  CHECK(contains(step("auto", none).obstacle, "needs an unbiased estimate"));
+  facts.estimates.back().name = "other";
+  facts.estimates.back().variance = false;
+  CHECK(contains(step("auto", none).obstacle, "needs an unbiased estimate"));
+  facts = fullFacts();
   // Whatever is registered: box is for stress tests and stands nowhere by itself.
   for (const auto& m : makeMethods()) {
     const Step s = step(m->name(), none);

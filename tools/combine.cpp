@@ -86,13 +86,10 @@ Rgb<float> readReferenceImage(const std::string& file, const Estimates& all) {
 Estimates readInputs(const CombineOptions& o, PipelineOptions& pipeline, std::vector<std::string>& notes) {
   ReadOptions read{"unbiased", ImageRole::Noisy, o.samplesPerPixel, &notes};
   Estimates all = readEstimatesOption(o.unbiased, read);
-  const auto independent = std::find_if(all.estimates.begin(), all.estimates.end(), [](const Estimate& e) {
-    return e.unbiased && e.correlation == Correlation::Independent;
-  });
-  if (independent == all.estimates.end())
+  pipeline.roles.unbiased = defaultUnbiased(factsOf(all));
+  if (pipeline.roles.unbiased.empty())
     throw Error(ExitCode::BadInput,
                 fmt::format("{}: holds no unbiased estimate with independent pixels, such as pt", o.unbiased));
-  pipeline.roles.unbiased = independent->name;
   if (!o.correlated.empty()) {
     read.foreignName = "correlated";
     Estimate& e = addEstimate(all, readEstimatesOption(o.correlated, read), o.correlated,
