@@ -405,3 +405,16 @@ TEST_CASE("A noisy lamp lends the dark pixels around it no error that they canno
   CHECK(static_cast<double>(error[lamp]) > 0.1);
   CHECK(beside / 0.01 < 0.02);  // relative; the lamp's own relative error is 0.0056
 }
+
+TEST_CASE("auto takes a consistent estimate in the place of an unbiased one, as it would that, and never twice") {
+  Estimates unbiased = kept(noisyCase(16), {"pt"}), consistent = unbiased;
+  consistent.estimates[0].unbiased = false;
+  const PipelineOutput one = outputOf(unbiased, "auto"), other = outputOf(consistent, "auto");
+  CHECK(other.step.unbiased == "pt");
+  CHECK(other.step.bases.empty());
+  bool same = true;
+  for (size_t i = 0; i < one.result.error.size(); ++i)
+    same &= one.result.image.mean.pixel(i) == other.result.image.mean.pixel(i) &&
+            one.result.error[i] == other.result.error[i];
+  CHECK(same);
+}
