@@ -12,12 +12,11 @@
 // under that method's name.
 //
 // How the roles are filled:
-//   unbiased    as named, or the first estimate that is unbiased and whose pixels are independent; if there is none,
-//   the
-//               first whose halves and variance tell its error all the same: vcm's, whose bias is far below its noise.
+//   unbiased    as named, or the first estimate that is unbiased and whose pixels are independent; or else the first
+//               with halves and variance and no estimate of its bias, such as vcm's: what it is off by is not seen.
 //   correlated  as named, or the first estimate that is unbiased and whose pixels are correlated.
 //   biased      after '@', or as named for all; or else the first denoiser asked for; or else the first biased
-//               estimate but that, and not for methods that run the denoiser again (SURE); or else the first that runs
+//               estimate beside it, but not for methods that run the denoiser again (SURE); or else the first that runs
 //               of oidn, nfor, rdfc, pw, nlm; or else the first other denoiser that runs. Never box, which is input for
 //               stress tests. The named input itself gets the default one when it needs a biased input.
 //   bases       after '@' with '+' between them, as in ensemble@nfor+rdfc; or as named for all; or else the denoisers
