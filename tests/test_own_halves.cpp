@@ -117,7 +117,7 @@ TEST_CASE("A half of RDFC carries noise of the other half; denoised by itself it
   }
 }
 
-TEST_CASE("js towards RDFC is better than the unbiased image where neighbours differ, as halves are denoised apart") {
+TEST_CASE("js towards RDFC is better than the unbiased image where neighbours differ, as halves are denoised apart" * doctest::test_suite("statistics")) {
   const Leaves l = leaves(3);
   const auto errorWith = [&](double own) {
     PipelineOptions options;

@@ -289,7 +289,7 @@ TEST_CASE("Light scales the output of the patch-Welch filter and nothing else") 
   }
 }
 
-TEST_CASE("Four times the samples shrink the error of the patch-Welch filter, which is always below the noise") {
+TEST_CASE("Four times the samples shrink the error of the patch-Welch filter, which is always below the noise" * doctest::test_suite("statistics")) {
   for (const double z : kThresholds) {
     double last = kInfinity;
     for (const uint64_t samples : {8, 32, 128, 512}) {
@@ -387,7 +387,7 @@ TEST_CASE("The halves average to the full output within the noise") {
   CHECK(difference < 0.1 * meanSquaredError(c.pt().mean, c.truth));
 }
 
-TEST_CASE("The other half estimates the error of a half within a factor of two") {
+TEST_CASE("The other half estimates the error of a half within a factor of two" * doctest::test_suite("statistics")) {
   for (const uint64_t samples : {16, 64}) {
     double estimated = 0, actual = 0;
     for (uint64_t seed = 1; seed <= 8; ++seed) {
@@ -408,7 +408,7 @@ TEST_CASE("The other half estimates the error of a half within a factor of two")
   }
 }
 
-TEST_CASE("The regularised variance has the right mean at any number of passes, and is nowhere zero beside noise") {
+TEST_CASE("The regularised variance has the right mean at any number of passes, and is nowhere zero beside noise" * doctest::test_suite("statistics")) {
   for (const uint64_t samples : {2, 3, 4, 16}) {
     double estimated = 0, actual = 0;
     bool positive = true;

@@ -227,7 +227,7 @@ TEST_CASE("Centres five pixels apart are as good as one at every pixel") {
   }
 }
 
-TEST_CASE("Four times the samples shrink the error of the first-order filter") {
+TEST_CASE("Four times the samples shrink the error of the first-order filter" * doctest::test_suite("statistics")) {
   double last = kInfinity;
   for (const uint64_t samples : {16, 64, 256}) {
     const Case c = caseOf(96, 72, samples);

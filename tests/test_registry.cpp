@@ -168,7 +168,7 @@ double allowedBias(const Integrator& integrator) { return integrator.unbiased() 
 
 }  // namespace
 
-TEST_CASE("Inside a furnace every integrator sees the closed form") {
+TEST_CASE("Inside a furnace every integrator sees the closed form" * doctest::test_suite("statistics")) {
   const Integrators all = makeIntegrators();
   for (const float albedo : {0.0f, 0.5f, 0.8f}) {
     const Scene scene(furnace(albedo, 1));
@@ -187,7 +187,7 @@ TEST_CASE("Inside a furnace every integrator sees the closed form") {
   }
 }
 
-TEST_CASE("Integrators agree on a Cornell box") {
+TEST_CASE("Integrators agree on a Cornell box" * doctest::test_suite("statistics")) {
   constexpr double kFalseAlarm = 1e-3;  // of all comparisons together
   const Scene scene(cornellBox());
   const Integrators all = makeIntegrators();

@@ -117,7 +117,7 @@ TEST_CASE("The second pass of images of one pixel, and of infinite features, is 
   }
 }
 
-TEST_CASE("auto has less error with its second pass, over cases and samples") {
+TEST_CASE("auto has less error with its second pass, over cases and samples" * doctest::test_suite("statistics")) {
   double logarithms = 0;
   int cases = 0;
   for (const uint64_t samples : {8, 32, 128})
