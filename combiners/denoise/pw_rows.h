@@ -26,12 +26,10 @@ inline Rows3 rowsAt(const PatchWelchTile::Plane3& planes, ptrdiff_t at) {
 }
 
 using Lanes = float __attribute__((vector_size(kRowUnit * sizeof(float))));
+using LanesInMemory = float __attribute__((vector_size(kRowUnit * sizeof(float)), aligned(alignof(float)), may_alias));
 
-inline Lanes lanesAt(const float* row) {
-  Lanes lanes;
-  std::memcpy(&lanes, row, sizeof(lanes));
-  return lanes;
-}
+// By reference: how wide vectors are returned depends on the instruction set.
+inline const LanesInMemory& lanesAt(const float* row) { return *reinterpret_cast<const LanesInMemory*>(row); }
 
 // Of each image, out = the sum over the channels of (u_p - u_q)² / (V_p + V_q + eps), for a multiple of kRowUnit pixels
 // from p on. All images at once: the processor divides while it computes the rest.
