@@ -12,6 +12,7 @@
 #include "renderer/film/exr.h"
 #include "tests/gltf_fixture.h"
 #include "tests/render_fixture.h"
+#include "tools/estimates_file.h"
 #include "tools/sweep.h"
 #include "tools/sweep_pipeline.h"
 #include "tools/sweep_reference.h"
@@ -283,6 +284,19 @@ TEST_CASE("References that show something else are refused with a sentence") {
   CHECK(readReference(rendered->file, frame, "pt", 0, 1).contentHash == rendered->contentHash);
   CHECK(failureOf([&] { readReference(rendered->file, frame, "pt", kReferenceSeed, 1); }).second.find("seed") !=
         std::string::npos);
+  CHECK(rendered->passedOver.empty());
+  // A file that shows a combined image first: its unbiased estimate is the reference, for that has independent halves.
+  const ImageFile file = readImage(rendered->file);
+  Estimates combined = readEstimates(file);
+  combined.attributes = file.attributes;
+  combined.attributes.push_back({"braid/headline", Attribute::Kind::String, "combined.auto", 0, 0, {}});
+  const std::string combinedPath = folder.path / "combined.exr";
+  ExrOptions exr;
+  exr.floatHeadline = true;
+  writeExr(combinedPath, combined, Rgb<float>(16, 16, 1.0f), nullptr, exr);
+  const SweepReference chosen = readReference(combinedPath, frame, "pt", 0, 1);
+  CHECK(chosen.passedOver == "combined.auto");
+  CHECK(chosen.contentHash == rendered->contentHash);
   camera.toWorld[3].x += 0.01f;
   const ReferenceFrame moved = referenceFrame(scene, camera, settings);
   CHECK(referenceName(moved) != referenceName(frame));

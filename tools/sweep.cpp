@@ -231,6 +231,10 @@ bool Sweep::findReference(SweepScene& scene) {
   if (integrator == "auto") integrator = scene.planned.find("sppm") == std::string::npos ? "pt" : "vcm";
   if (!file.empty()) {
     scene.reference = readReference(file, frame, integrator, o_.seed, static_cast<uint64_t>(o_.seeds));
+    const SweepReference& r = scene.reference;
+    if (!r.passedOver.empty())
+      warn(fmt::format("{}: errors are against {}.mean of {}, not against its {}, whose halves are not independent",
+                       scene.name, r.integrator, file, r.passedOver));
     return true;
   }
   if (auto kept = keptReference(path("references"), frame, integrator, o_.referenceSpp)) {

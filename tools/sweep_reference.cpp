@@ -92,6 +92,7 @@ SweepReference toReference(const ImageFile& file, const std::string& integrator)
   r.image.mean = file.rgb(estimate.empty() ? "" : estimate + ".mean");
   if (!estimate.empty()) {
     r.integrator = estimate;
+    r.passedOver = textOf(file, "braid/headline");
     r.image.half[0] = file.rgb(estimate + ".halfA");
     r.image.half[1] = file.rgb(estimate + ".halfB");
     if (const Attribute* passes = find(file, "braid/" + estimate + "/passes"))

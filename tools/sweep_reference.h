@@ -33,6 +33,7 @@ std::string referenceName(const ReferenceFrame& frame);
 struct SweepReference {
   ReferenceImage image;
   std::string file, integrator;  // no integrator: an image of another renderer
+  std::string passedOver;        // the combined image that the file shows first: its halves are not independent
   uint64_t spp = 0;              // 0: not known
   double seconds = 0;            // that its render took, 0: not known
   uint64_t contentHash = 0;      // over the mean
