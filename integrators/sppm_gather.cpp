@@ -18,7 +18,7 @@ PhotonSum gather(const Grid& grid, const SubpathVertex& vertex, float radius, in
                  const Scattering& scattering) {
   PhotonSum sum;
   const Hit& hit = vertex.hit;
-  const float inner2 = 0.5f * sqr(radius);
+  const float inner2 = kInnerArea * sqr(radius);
   grid.query(hit.position, radius, [&](const auto& photon, float distance2) {
     ++sum.photons;
     if (photon.segments > maxSegments) return;
@@ -57,8 +57,9 @@ RadiusScale gatherRadii(const Plan& plan, const SceneTraits& traits, uint64_t pa
 GatheredLight gatheredLight(const PhotonSum& sum, double lightPaths, float radius) {
   const double area = static_cast<double>(kPi) * sqr(static_cast<double>(radius));
   const auto scale = static_cast<float>(1 / (lightPaths * area));
-  // The bias of a constant kernel grows with its area: that of the whole disc is twice its excess over half of it.
-  return {(sum.inner + sum.outer) * scale, (2.0f * (sum.outer - sum.inner)) * scale};
+  // The bias of a constant kernel grows with its area, so the excess over the inner disc is this share of it.
+  const Spectrum all = sum.inner + sum.outer;
+  return {all * scale, (all - sum.inner / kInnerArea) * (scale / (1 - kInnerArea))};
 }
 
 PhotonSum gatherPhotons(const PhotonGrid& grid, const SubpathVertex& vertex, float radius, int maxSegments) {

@@ -170,7 +170,7 @@ TEST_CASE("Without photon maps the fused estimate is the unbiased one") {
   CHECK(f.squaredBias.empty());
 }
 
-TEST_CASE("Fused weights are inverse errors, and the bias that is left is counted") {
+TEST_CASE("Fused weights are inverse errors, with squared biases counted twice, and the bias that is left is told") {
   Estimate x = flat(1.0f, 0.03f), s = flat(1.0f, 0.005f);
   s.name = "sppm";
   s.unbiased = false;
@@ -180,11 +180,11 @@ TEST_CASE("Fused weights are inverse errors, and the bias that is left is counte
   s.bias = Rgb<float>(40, 30, bias);
   s.biasVariance = Rgb<float>(40, 30);
   const FusedEstimate f = fusedEstimate(x, {&s}, nullptr);
-  // Errors 0.03 and 0.01: weights 1/4 and 3/4.
-  CHECK(f.image.mean[0][500] == doctest::Approx(0.25 * 1.0 + 0.75 * (1 - bias)).epsilon(1e-3));
-  CHECK(f.image.quarter[2][1][500] == doctest::Approx(1 - 0.75 * bias).epsilon(1e-3));
-  CHECK(f.image.variance[0][500] == doctest::Approx(0.0625 * 0.03 + 0.5625 * 0.01).epsilon(1e-3));
-  CHECK(f.squaredBias[500] == doctest::Approx(0.5625 * 0.005).epsilon(1e-3));
+  // Errors 0.03 and 0.005 + 2 · 0.005: weights 1/3 and 2/3.
+  CHECK(f.image.mean[0][500] == doctest::Approx(1 - bias * 2 / 3).epsilon(1e-3));
+  CHECK(f.image.quarter[2][1][500] == doctest::Approx(1 - bias * 2 / 3).epsilon(1e-3));
+  CHECK(f.image.variance[0][500] == doctest::Approx((0.03 + 4 * 0.015) / 9).epsilon(1e-3));
+  CHECK(f.squaredBias[500] == doctest::Approx(4 * 2 * 0.005 / 9).epsilon(1e-3));
 }
 
 TEST_CASE("An outlier that both images hold makes no noise of the pixels around it") {

@@ -165,17 +165,21 @@ TEST_CASE("sppm: radii depend on the pass alone, alike for four passes, and fall
   CHECK(radiusShrinkage(4 * 728) == doctest::Approx(1.0 / 3));
 }
 
-TEST_CASE("sppm: the bias estimate is true for a quadratic irradiance") {
-  // Photons on a lattice, turned against the axes, with E(x) = 1 + 3 x² W/m²: the kernel's bias is R²/8 · ΔE = 3 R²/4.
+namespace {
+
+// Light paths on a lattice, turned against the axes, that bring the irradiance E(x, y) W/m² to a diffuse white plane
+// about the origin; and what is gathered at a point of it.
+template <class Irradiance>
+GatheredLight gatherLattice(const Irradiance& irradiance, float radius, const Vec3& position) {
   constexpr int kSide = 900;
-  constexpr float kRadius = 0.4f, kCell = 2.0f / kSide;
+  constexpr float kCell = 2.0f / kSide;
   std::vector<Photon> photons;
   for (int j = 0; j < kSide; ++j)
     for (int i = 0; i < kSide; ++i) {
       const float u = (static_cast<float>(i) + 0.5f) * kCell - 1, v = (static_cast<float>(j) + 0.5f) * kCell - 1;
       Photon p;
       p.position = Vec3(0.8f * u - 0.6f * v, 0.6f * u + 0.8f * v, 0);
-      p.power = Spectrum((1 + 3 * sqr(p.position.x)) * sqr(kCell));
+      p.power = Spectrum(irradiance(p.position) * sqr(kCell));
       p.direction = packDirection({0, 0, 1}, 16);
       p.normal = static_cast<uint16_t>(packDirection({0, 0, 1}, 8));
       p.segments = 1;
@@ -183,18 +187,46 @@ TEST_CASE("sppm: the bias estimate is true for a quadratic irradiance") {
     }
   RadiusScale scale;
   scale.perspective = false;
-  scale.perMetre = scale.largest = kRadius;
+  scale.perMetre = scale.largest = radius;
   scale.smallest = 1e-3f;
   SubpathVertex vertex(Spectrum(1), Vec3(0, 0, 1));
-  vertex.hit.position = Vec3(0.1f, 0, 0);
+  vertex.hit.position = position;
   vertex.hit.ng = Vec3(0, 0, 1);
   vertex.hit.frame = Frame();
-  const PhotonSum sum = gatherPhotons(PhotonGrid(photons, scale), vertex, kRadius, 5);
-  const auto area = static_cast<double>(kPi * sqr(kRadius));
-  const double irradiance = static_cast<double>(kPi * (sum.inner + sum.outer).x) / area;
-  const double bias = static_cast<double>(kPi * 2.0f * (sum.outer - sum.inner).x) / area;
-  CHECK(irradiance == doctest::Approx(1.03 + 0.75 * 0.16).epsilon(2e-3));
-  CHECK(bias == doctest::Approx(0.75 * 0.16).epsilon(0.03));
+  return gatheredLight(gatherPhotons(PhotonGrid(photons, scale), vertex, radius, 5), 1, radius);
+}
+
+// How much of a disc of radius 1 lies beyond a line at this distance from its centre.
+double beyond(double distance) {
+  const double d = std::clamp(distance, -1.0, 1.0);
+  return (std::acos(d) - d * std::sqrt(1 - d * d)) / static_cast<double>(kPi);
+}
+
+}  // namespace
+
+TEST_CASE("sppm: the bias estimate is true for a quadratic irradiance") {
+  // E(x) = 1 + 3 x² W/m²: the kernel's bias is R²/8 · ΔE = 3 R²/4.
+  const GatheredLight light = gatherLattice([](const Vec3& p) { return 1 + 3 * sqr(p.x); }, 0.4f, Vec3(0.1f, 0, 0));
+  CHECK(kPi * light.radiance.x == doctest::Approx(1.03 + 0.75 * 0.16).epsilon(2e-3));
+  CHECK(kPi * light.bias.x == doctest::Approx(0.75 * 0.16).epsilon(0.03));
+}
+
+TEST_CASE("sppm: at an edge of light the bias estimate tells 0.41 of the mean squared bias") {
+  constexpr float kRadius = 0.4f;
+  const double inner = std::sqrt(static_cast<double>(kInnerArea));
+  double told = 0, truth = 0;
+  for (const double d : {-0.9, -0.7, -0.5, -0.3, -0.1, 0.1, 0.3, 0.5, 0.7, 0.9}) {
+    const Vec3 at(static_cast<float>(d) * kRadius, 0, 0);
+    const GatheredLight light = gatherLattice([](const Vec3& p) { return p.x > 0 ? 1.0f : 0.0f; }, kRadius, at);
+    const double lit = d > 0, bias = beyond(-d) - lit;
+    CAPTURE(d);
+    CHECK(kPi * light.radiance.x == doctest::Approx(lit + bias).epsilon(0.01));
+    const double expected = (beyond(-d) - beyond(-d / inner)) / (1 - sqr(inner));
+    CHECK(std::abs(static_cast<double>(kPi * light.bias.x) - expected) < 0.01);
+    told += sqr(static_cast<double>(kPi * light.bias.x));
+    truth += sqr(bias);
+  }
+  CHECK(told / truth == doctest::Approx(0.41).epsilon(0.1));
 }
 
 TEST_CASE("sppm: what a pass stores is bounded, and thinning does not change the mean") {
