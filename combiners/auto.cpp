@@ -17,6 +17,7 @@
 #include "combiners/denoise/pw_filter.h"
 #include "combiners/denoise/variance.h"
 #include "combiners/despike.h"
+#include "combiners/debias.h"
 #include "combiners/error_map.h"
 #include "combiners/finite_float.h"
 #include "combiners/fused_estimate.h"
@@ -33,6 +34,7 @@ namespace {
 
 const OptionInfo kPatch{"auto-patch", 15, "Width in pixels of the patches that errors are summed over"};
 const OptionInfo kFuse{"auto-fuse", 1, "0: photon maps are bases, not part of the image that is denoised"};
+const OptionInfo kDebias{"auto-debias", 1, "0: photon maps keep the bias that they tell"};
 const OptionInfo kShrink{"auto-shrink", 1, "0: bases only, without James-Stein shrinkage towards them"};
 const OptionInfo kSecondPass{"auto-second-pass", 1, "0: the combined image is not filtered once more"};
 const OptionInfo kLightParts{"auto-light-parts", 1, "0: direct and indirect light are filtered together"};
@@ -66,7 +68,7 @@ class Auto : public Method {
   }
   MethodMemory memory(const MemoryCase& of) const override;
   std::vector<OptionInfo> options() const override {
-    return {kPatch, kFuse, kLightParts, kShrink, kDespike, kSecondPass};
+    return {kPatch, kFuse, kDebias, kLightParts, kShrink, kDespike, kSecondPass};
   }
   MethodResult run(const MethodInputs& in) const override;
 };
@@ -212,13 +214,23 @@ void addTo(Plane<float>& sum, const Plane<float>& other) {
     sum[i] = finiteFloat(static_cast<double>(sum[i]) + static_cast<double>(other[i]));
 }
 
+// The unbiased image fused with the photon maps, without the bias that these tell.
+FusedEstimate fusedWith(std::vector<const Estimate*> photonMaps, const MethodInputs& in) {
+  if (in.options.number(kDebias) == 0) return fusedEstimate(*in.unbiased, photonMaps, in.features);
+  std::vector<Estimate> corrected;
+  corrected.reserve(photonMaps.size());
+  for (const Estimate*& map : photonMaps)
+    if (mayBeMeasured(*map)) map = &corrected.emplace_back(debiased(*map));
+  return fusedEstimate(*in.unbiased, photonMaps, in.features);
+}
+
 MethodResult Auto::run(const MethodInputs& in) const {
   MethodResult result;
   std::vector<const Estimate*> photonMaps, others;
   for (const Estimate* b : in.bases)
     (!b->bias.empty() && in.options.number(kFuse) != 0 ? photonMaps : others).push_back(b);
   FusedEstimate fused;
-  if (!photonMaps.empty()) fused = fusedEstimate(*in.unbiased, photonMaps, in.features);
+  if (!photonMaps.empty()) fused = fusedWith(photonMaps, in);
   Estimate* own =
       photonMaps.empty() ? in.expendable : &fused.image;  // the unbiased or fused image, if it may be changed
   Estimate copy;

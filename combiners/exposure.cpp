@@ -166,6 +166,7 @@ Estimate normalised(const Estimate& e, double k, SanitiseReport& report, bool qu
     for (const Rgb<float>& q : e.quarter) out.quarter.push_back(changed(q, colours(k), report));
   out.variance = changed(e.variance, variances(k), report);
   out.bias = changed(e.bias, colours(k), report);
+  for (size_t h = 0; h < 2; ++h) out.biasHalf[h] = changed(e.biasHalf[h], colours(k), report);
   out.biasVariance = changed(e.biasVariance, variances(k), report);
   if (!lightParts) return out;
   out.direct.mean = changed(e.direct.mean, colours(k), report);
@@ -200,7 +201,8 @@ bool isSane(const Features& f, bool noise) {
 void undoExposure(MethodResult& result, double k) {
   const double back = 1 / k;
   Estimate& e = result.image;
-  for (Rgb<float>* image : {&e.mean, &e.half[0], &e.half[1], &e.bias}) multiply(*image, back);
+  for (Rgb<float>* image : {&e.mean, &e.half[0], &e.half[1], &e.bias, &e.biasHalf[0], &e.biasHalf[1]})
+    multiply(*image, back);
   for (Rgb<float>& q : e.quarter) multiply(q, back);
   for (Rgb<float>* variance : {&e.variance, &e.biasVariance}) multiply(*variance, back * back);
   multiply(result.error, back * back);

@@ -47,7 +47,8 @@ void checkSizes(const Estimates& all) {
     throw Error(ExitCode::BadInput, fmt::format("the reference is not of the size {}x{}", all.width, all.height));
   for (const Estimate& e : all.estimates) {
     bool ok = !e.mean.empty() && sizeIs(e.variance, all) && sizeIs(e.bias, all) && sizeIs(e.biasVariance, all);
-    for (const Rgb<float>* image : {&e.mean, &e.half[0], &e.half[1]}) ok = ok && sizeIs(*image, all);
+    for (const Rgb<float>* image : {&e.mean, &e.half[0], &e.half[1], &e.biasHalf[0], &e.biasHalf[1]})
+      ok = ok && sizeIs(*image, all);
     for (const Rgb<float>& q : e.quarter) ok = ok && sizeIs(q, all);
     if (!ok)
       throw Error(ExitCode::BadInput, fmt::format("the planes of the estimate {} are not all of the size {}x{}", e.name,

@@ -18,7 +18,7 @@ int imagesOf(const EstimateFacts& e) {
   if (e.halves) bytes += 2 * kColour;
   if (e.variance) bytes += kColour;
   if (e.quarters) bytes += 4 * kColour;
-  if (e.bias) bytes += 2 * kColour;
+  if (e.bias) bytes += 4 * kColour;
   if (e.lightParts) bytes += 5 * kColour;
   return bytes;
 }

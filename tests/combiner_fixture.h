@@ -30,6 +30,9 @@ struct CaseOptions {
   double correlatedNoise = 1;  // as `noise`, of the estimate by common random numbers
   double photonNoise = 0.25;   // as `noise`, of the biased estimate
   int photonBlur = 3;          // radius of the box that blurs the biased estimate
+  // What the biased estimate tells of its bias: its excess over a box of half the radius, as photon maps do, which is
+  // less than all at edges; or all of it.
+  bool allBiasTold = false;
   double featureNoise = 0.05;  // standard deviation of one sample of a feature component
 };
 
@@ -273,12 +276,18 @@ inline Case makeCase(const CaseOptions& o = {}) {
   }));
   Estimate& sppm = e.estimates.back();
   sppm.unbiased = false;
+  const int innerBlur = o.allBiasTold ? 0 : o.photonBlur / 2;
+  const Rgb<float> inner = detail::boxFilter(result.truth, innerBlur);
+  // The bias under curved light goes with r (r + 1).
+  const double share =
+      o.photonBlur == 0 ? 0 : 1 - innerBlur * (innerBlur + 1.0) / (o.photonBlur * (o.photonBlur + 1.0));
   const Estimate bias = detail::estimateOfSamples("bias", o, [&](uint64_t pass, size_t i, size_t c) {
     const double u = detail::uniform(o.seed, 4, pass, item(i, c));
-    const double b = static_cast<double>(blurred[c][i]) - static_cast<double>(result.truth[c][i]);
-    return b * detail::factor(u, o.photonNoise);
+    const double excess = static_cast<double>(blurred[c][i]) - static_cast<double>(inner[c][i]);
+    return (share > 0 ? excess / share : 0) * detail::factor(u, o.photonNoise);
   });
   sppm.bias = bias.mean;
+  for (int h = 0; h < 2; ++h) sppm.biasHalf[h] = bias.half[h];
   sppm.biasVariance = bias.variance;
 
   result.denoised.push_back(detail::boxDenoised("narrow", result.pt(), 1));

@@ -53,6 +53,7 @@ inline void resample(Case& c, size_t index, const StiffSample& sample) {
   e.unbiased = old.unbiased;
   e.correlation = old.correlation;
   e.bias = old.bias;
+  for (int h = 0; h < 2; ++h) e.biasHalf[h] = old.biasHalf[h];
   e.biasVariance = old.biasVariance;
   old = std::move(e);
   if (index > 0) return;
@@ -86,7 +87,7 @@ inline StiffCase withBiased(const std::string& name, Case c, Estimate y, Claims 
   y.name = "sppm";
   y.unbiased = false;
   y.correlation = Correlation::Independent;
-  y.bias = y.biasVariance = {};
+  y.bias = y.biasHalf[0] = y.biasHalf[1] = y.biasVariance = {};
   if (claims == Claims::Nothing) y.variance = {};
   if (claims != Claims::Nothing) y.bias = y.biasVariance = Rgb<float>(c.truth.width(), c.truth.height());
   if (claims == Claims::Honest)
@@ -144,7 +145,9 @@ inline void island(Estimate& e, int x0, int y0, float value) {
       for (int y = y0; y < std::min(p.height, y0 + 4); ++y)
         for (int x = x0; x < std::min(p.width, x0 + 5); ++x) p.at(x, y) = value;
   };
-  for (Rgb<float>* image : {&e.mean, &e.half[0], &e.half[1], &e.variance, &e.bias, &e.biasVariance}) fill(*image);
+  for (Rgb<float>* image :
+       {&e.mean, &e.half[0], &e.half[1], &e.variance, &e.bias, &e.biasHalf[0], &e.biasHalf[1], &e.biasVariance})
+    fill(*image);
   for (Rgb<float>& q : e.quarter) fill(q);
 }
 

@@ -104,7 +104,7 @@ TEST_CASE("A photon map comes with its bias, and with an error map of variance a
   const Folder folder;
   const ImageFile file = rendered(folder, "--integrator sppm --spp 8");
   const std::set<std::string> names = channels(file);
-  for (const char* layer : {"sppm.mean.R", "sppm.bias.R", "sppm.biasVariance.R", "Error.Y"})
+  for (const char* layer : {"sppm.mean.R", "sppm.bias.R", "sppm.biasA.R", "sppm.biasB.R", "sppm.biasVariance.R", "Error.Y"})
     CHECK_MESSAGE(names.count(layer), layer);
   Estimate estimate;
   estimate.mean = file.rgb("sppm.mean");

@@ -40,7 +40,7 @@ Estimates spoiled(const Case& c) {
     spoil(x.mean, offset++);
     for (Rgb<float>& half : x.half) spoil(half, offset++);
     for (Rgb<float>& q : x.quarter) spoil(q, offset++);
-    for (Rgb<float>* image : {&x.variance, &x.bias, &x.biasVariance}) spoil(*image, offset++);
+    for (Rgb<float>* image : {&x.variance, &x.bias, &x.biasHalf[0], &x.biasHalf[1], &x.biasVariance}) spoil(*image, offset++);
   }
   for (Checkpoint& k : e.history["pt"]) spoil(k.variance, offset++);
   for (FeaturePlanes<Rgb<float>>* f : {&e.features->albedo, &e.features->normal})

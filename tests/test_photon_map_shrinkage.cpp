@@ -119,6 +119,7 @@ TEST_CASE("double-shrinkage: texture and shadow edges, which the prior blurs, st
   const Case c = makeCase(o);
   const auto error = [&](const std::string& option, double value) {
     MethodInputs in = inputsOf(c, "sppm");
+    in.options.set("double-shrinkage-debias", 0);
     in.options.set("double-shrinkage-" + option, value);
     const Rgb<float> image = make_double_shrinkage()->run(in).image.mean;
     double sum = 0;

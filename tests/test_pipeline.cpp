@@ -124,6 +124,7 @@ TEST_CASE("Scaling multiplies colours by k and variances by its square, and back
   CHECK(e.estimates[2].mean[1][9] == 4 * before.estimates[2].mean[1][9]);
   CHECK(e.estimates[2].quarter[3][1][9] == 4 * before.estimates[2].quarter[3][1][9]);
   CHECK(e.estimates[2].bias[1][9] == 4 * before.estimates[2].bias[1][9]);
+  CHECK(e.estimates[2].biasHalf[1][1][9] == 4 * before.estimates[2].biasHalf[1][1][9]);
   CHECK(e.estimates[2].variance[1][9] == 16 * before.estimates[2].variance[1][9]);
   CHECK(e.estimates[2].biasVariance[1][9] == 16 * before.estimates[2].biasVariance[1][9]);
   CHECK(e.history.at("pt")[2].variance[1][9] == 16 * before.history.at("pt")[2].variance[1][9]);

@@ -11,6 +11,7 @@
 
 #include <doctest/doctest.h>
 
+#include "combiners/debias.h"
 #include "combiners/error_map.h"
 #include "combiners/fused_estimate.h"
 #include "combiners/pipeline.h"
@@ -130,7 +131,8 @@ std::string beyondDifferences(const Rgb<float>& out, const Rgb<float>& y, const 
 //   inverse-variance, easy, curves,
 //   ideal                              a share in [0, 1] of X and of Y
 //   js without its regression          Y + rho (X - Y), rho in [0, 1]; then not below 0
-//   double-shrinkage                   twice a share in [0, 1]: of X, Y and the prior (an output); not below 0
+//   double-shrinkage                   twice a share in [0, 1]: of X, Y, less its told bias or not, and
+//                                      the prior (an output); not below 0
 //   box, nlm, pw, pw-wide, rdfc        weighted means of pixels of X (rdfc: of its halves)
 //   uncorrelated*                      a weighted sum of differences
 // No range: nfor, pw1, js with its regression and auto, which holds pw1, extrapolate by slopes.
@@ -148,7 +150,8 @@ std::optional<std::string> beyondRange(const std::string& name, const Method& m,
   if (name == "js") return beyondHull(out, {&x.mean, &y.mean}, true);
   if (name == "double-shrinkage") {
     const Rgb<float> prior = priorOf(r);
-    return beyondHull(out, {&x.mean, &y.mean, &prior}, true);
+    const Estimate less = debiased(y);
+    return beyondHull(out, {&x.mean, &y.mean, &less.mean, &prior}, true);
   }
   if (startsWith(name, "uncorrelated")) {
     std::string beyond;

@@ -327,7 +327,7 @@ TEST_CASE("Biases, features and coverage of stiff passes stay finite, and consta
     target.clear();
   }
   CHECK(film.rejected() == 2 * 9 * kPassCount);
-  for (const Rgb<float>& image : {film.biasMean(), film.biasVariance()})
+  for (const Rgb<float>& image : {film.biasMean(), film.biasHalfMean(0), film.biasHalfMean(1), film.biasVariance()})
     for (size_t c = 0; c < 3; ++c)
       for (const float v : image[c].data) CHECK(std::isfinite(v));
   for (int k = 0; k < FeatureSample::kComponents; ++k)

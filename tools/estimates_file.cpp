@@ -90,6 +90,8 @@ Estimate readEstimate(const ImageFile& file, const std::string& layer, const std
   e.half[1] = layerOrNone(file, layer + ".halfB");
   e.variance = layerOrNone(file, layer + ".variance");
   e.bias = layerOrNone(file, layer + ".bias");
+  e.biasHalf[0] = layerOrNone(file, layer + ".biasA");
+  e.biasHalf[1] = layerOrNone(file, layer + ".biasB");
   e.biasVariance = layerOrNone(file, layer + ".biasVariance");
   LightPart direct{layerOrNone(file, layer + ".direct"),
                    {layerOrNone(file, layer + ".directA"), layerOrNone(file, layer + ".directB")},

@@ -34,7 +34,7 @@ void Accumulator::add(const Accumulator& other) {
   }
   addPlanes(sumsq_, other.sumsq_);
   if (keepsBias()) {
-    addPlanes(biasSum_, other.biasSum_);
+    for (size_t h = 0; h < 2; ++h) addPlanes(biasSum_[h], other.biasSum_[h]);
     addPlanes(biasSumsq_, other.biasSumsq_);
   }
   rejected_ += other.rejected_;

@@ -37,8 +37,9 @@ struct Estimate : EstimateHead {
   Rgb<float> half[2];               // A, B
   std::vector<Rgb<float>> quarter;  // four, or none
   Rgb<float> variance;              // of the mean; empty when not known
-  // Of integrators that estimate their bias: the mean estimate and the variance of that mean; else empty.
-  Rgb<float> bias, biasVariance;
+  // Of integrators that estimate their bias: the mean estimate, those of the halves, and the variance of the mean; else
+  // empty.
+  Rgb<float> bias, biasHalf[2], biasVariance;
   // Of integrators that tell two parts of the light apart, where these are kept; else empty. Direct light comes
   // straight from lights to the first non-specular vertex of the camera's path, or to the camera, there perhaps by
   // specular vertices. The rest is indirect: mean and halves are differences, only the variance is not.

@@ -77,6 +77,8 @@ void addEstimate(ChannelList& channels, const Estimate& e, const ExrOptions& opt
   channels.add(e.name + ".halfB", kColour, e.half[1]);
   channels.add(e.name + ".variance", kColour, e.variance);
   channels.add(e.name + ".bias", kColour, e.bias);
+  channels.add(e.name + ".biasA", kColour, e.biasHalf[0]);
+  channels.add(e.name + ".biasB", kColour, e.biasHalf[1]);
   channels.add(e.name + ".biasVariance", kColour, e.biasVariance);
   if (options.lightParts) {
     channels.add(e.name + ".direct", kColour, e.direct.mean);

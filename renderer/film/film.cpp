@@ -143,7 +143,7 @@ Accumulator::Accumulator(int width, int height, int buckets, bool bias)
       sumsq_(width, height),
       count_(static_cast<size_t>(buckets), 0) {
   BRAID_ASSERT(buckets >= 2 && buckets % 2 == 0);
-  if (bias) biasSum_ = biasSumsq_ = Rgb<double>(width, height);
+  if (bias) biasSum_[0] = biasSum_[1] = biasSumsq_ = Rgb<double>(width, height);
 }
 
 Accumulator Accumulator::fromSums(std::vector<Rgb<double>> sums, Rgb<double> sumOfSquares, std::vector<uint64_t> counts,
@@ -180,7 +180,7 @@ void Accumulator::commit(uint64_t pass, const PassTarget& target) {
         commitRow(own, target.splats_.data() + 3 * begin + c, unit, s, q, width);
     }
   });
-  if (keepsBias()) commitBias(target);
+  if (keepsBias()) commitBias(static_cast<int>(pass % 2), target);
   ++count_[bucket];
   rejected_ += target.rejected();
   clampedSplats_ += target.clampedSplats();
@@ -199,38 +199,54 @@ void Accumulator::commit(uint64_t pass, const Rgb<float>& values) {
   ++count_[bucket];
 }
 
-void Accumulator::commitBias(const PassTarget& target) {
+void Accumulator::commitBias(int half, const PassTarget& target) {
   BRAID_ASSERT(target.wantsBias());
   const auto width = static_cast<size_t>(width_);
   parallelRows(height_, [&](int y) {
     const size_t begin = static_cast<size_t>(y) * width;
     for (size_t c = 0; c < 3; ++c)
-      commitRow(target.bias_[c].data.data() + begin, biasSum_[c].data.data() + begin, biasSumsq_[c].data.data() + begin,
-                width);
+      commitRow(target.bias_[c].data.data() + begin, biasSum_[half][c].data.data() + begin,
+                biasSumsq_[c].data.data() + begin, width);
   });
 }
 
-void Accumulator::setBiasSums(Rgb<double> sum, Rgb<double> sumOfSquares) {
-  BRAID_ASSERT(sum.width() == width_ && sum.height() == height_ && sumOfSquares.size() == sum.size());
-  biasSum_ = std::move(sum);
+void Accumulator::setBiasSums(Rgb<double> ofA, Rgb<double> ofB, Rgb<double> sumOfSquares) {
+  for (const Rgb<double>* plane : {&ofA, &ofB, &sumOfSquares})
+    BRAID_ASSERT(plane->width() == width_ && plane->height() == height_);
+  biasSum_[0] = std::move(ofA);
+  biasSum_[1] = std::move(ofB);
   biasSumsq_ = std::move(sumOfSquares);
 }
 
 Rgb<float> Accumulator::biasMean() const {
-  Rgb<float> out(biasSum_.width(), biasSum_.height());
+  Rgb<float> out(biasSumsq_.width(), biasSumsq_.height());
   const double scale = passes() > 0 ? 1 / static_cast<double>(passes()) : 0.0;
   for (size_t c = 0; c < 3; ++c)
     parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) out[c][i] = static_cast<float>(biasSum_[c][i] * scale);
+      for (size_t i = begin; i < end; ++i)
+        out[c][i] = static_cast<float>((biasSum_[0][c][i] + biasSum_[1][c][i]) * scale);
+    });
+  return out;
+}
+
+Rgb<float> Accumulator::biasHalfMean(int half) const {
+  Rgb<float> out(biasSumsq_.width(), biasSumsq_.height());
+  uint64_t n = 0;
+  for (size_t k = static_cast<size_t>(half); k < count_.size(); k += 2) n += count_[k];
+  const double scale = n > 0 ? 1 / static_cast<double>(n) : 0.0;
+  for (size_t c = 0; c < 3; ++c)
+    parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) out[c][i] = static_cast<float>(biasSum_[half][c][i] * scale);
     });
   return out;
 }
 
 Rgb<float> Accumulator::biasVariance() const {
-  Rgb<float> out(biasSum_.width(), biasSum_.height());
+  Rgb<float> out(biasSumsq_.width(), biasSumsq_.height());
   for (size_t c = 0; c < 3; ++c)
     parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) out[c][i] = floatVarianceOfMean(biasSum_[c][i], biasSumsq_[c][i], passes());
+      for (size_t i = begin; i < end; ++i)
+        out[c][i] = floatVarianceOfMean(biasSum_[0][c][i] + biasSum_[1][c][i], biasSumsq_[c][i], passes());
     });
   return out;
 }

@@ -94,7 +94,7 @@ class PassTarget {
 };
 
 // Sums of one integrator's passes. Bucket of a pass = pass % bucketCount(); half A = even buckets, B = odd ones. All
-// pixels have the same count. 120 bytes a pixel with four buckets, 72 with two; 48 more with estimates of the bias.
+// pixels have the same count. 120 bytes a pixel with four buckets, 72 with two; 72 more with estimates of the bias.
 class Accumulator {
  public:
   Accumulator(int width, int height, int buckets, bool bias = false);
@@ -123,15 +123,16 @@ class Accumulator {
   // (ALGORITHMS 4.6 step 1); buckets of unequal counts are weighted.
   Rgb<float> variance(bool lowDiscrepancy) const;
 
-  // The mean estimate of the bias and the variance of that mean; empty when bias is not kept.
-  bool keepsBias() const { return !biasSum_.empty(); }
+  // The mean estimate of the bias, those of the halves, and the variance of the mean; empty when bias is not kept.
+  bool keepsBias() const { return !biasSumsq_.empty(); }
   Rgb<float> biasMean() const;
+  Rgb<float> biasHalfMean(int half) const;
   Rgb<float> biasVariance() const;
 
   // Raw sums, for state files: what a file holds, and back.
-  const Rgb<double>& biasSum() const { return biasSum_; }
+  const Rgb<double>& biasSum(int half) const { return biasSum_[half]; }
   const Rgb<double>& biasSumOfSquares() const { return biasSumsq_; }
-  void setBiasSums(Rgb<double> sum, Rgb<double> sumOfSquares);
+  void setBiasSums(Rgb<double> ofA, Rgb<double> ofB, Rgb<double> sumOfSquares);
   const std::vector<Rgb<double>>& sums() const { return sum_; }
   const Rgb<double>& sumOfSquares() const { return sumsq_; }
   static Accumulator fromSums(std::vector<Rgb<double>> sums, Rgb<double> sumOfSquares, std::vector<uint64_t> counts,
@@ -141,13 +142,13 @@ class Accumulator {
 
  private:
   Rgb<float> meanOfBuckets(int first, int step) const;
-  void commitBias(const PassTarget& target);
+  void commitBias(int half, const PassTarget& target);
   // Variance of the mean from the spread of the bucket means (independent scrambles).
   Plane<double> bucketVariance(size_t channel) const;
   int width_, height_;
   std::vector<Rgb<double>> sum_;
   Rgb<double> sumsq_;
-  Rgb<double> biasSum_, biasSumsq_;  // or empty
+  Rgb<double> biasSum_[2], biasSumsq_;  // of the halves, and of all passes; or empty
   std::vector<uint64_t> count_;
   uint64_t rejected_ = 0, clampedSplats_ = 0;
 };

@@ -51,6 +51,7 @@ Estimate estimateOf(const EstimateState& state, bool quarters) {
   estimate.variance = a.variance(state.lowDiscrepancy);
   if (a.keepsBias()) {
     estimate.bias = a.biasMean();
+    for (int h = 0; h < 2; ++h) estimate.biasHalf[h] = a.biasHalfMean(h);
     estimate.biasVariance = a.biasVariance();
   }
   if (state.parts) {

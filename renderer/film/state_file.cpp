@@ -19,7 +19,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "state files hold the planes as they lie in memory");
 
 constexpr char kMagic[] = "braid-state";
-constexpr int kFormat = 2;
+constexpr int kFormat = 3;
 constexpr uint64_t kMaxHeader = 16 << 20;
 constexpr size_t kFirstLine = 64;      // at most
 constexpr size_t kChecksumBytes = 17;  // 16 digits and a newline
@@ -34,7 +34,7 @@ void forEachPlane(const FilmState& state, const Visit& visit) {
     for (const Rgb<double>& sum : e.sums.sums()) colour(sum);
     colour(e.sums.sumOfSquares());
     if (e.sums.keepsBias()) {
-      colour(e.sums.biasSum());
+      for (int half = 0; half < 2; ++half) colour(e.sums.biasSum(half));
       colour(e.sums.biasSumOfSquares());
     }
     if (e.parts) {
@@ -158,8 +158,8 @@ Accumulator readSums(Reader& in, const FilmState& state, const EstimateLayout& l
 void readEstimate(Reader& in, const FilmState& state, const EstimateLayout& layout, EstimateState& e) {
   e.sums = readSums(in, state, layout);
   if (layout.bias) {
-    Rgb<double> bias = readColour<double>(in, state);
-    e.sums.setBiasSums(std::move(bias), readColour<double>(in, state));
+    Rgb<double> ofA = readColour<double>(in, state), ofB = readColour<double>(in, state);
+    e.sums.setBiasSums(std::move(ofA), std::move(ofB), readColour<double>(in, state));
   }
   if (layout.parts) {
     Accumulator direct = readSums(in, state, layout);

@@ -306,7 +306,7 @@ std::vector<PlaneEntry> planeTable(const FilmState& state, const StateLayout& la
     for (int k = 0; k < state.buckets; ++k) colour(fmt::format("{}.sum{}", e.name, k), 8);
     colour(e.name + ".squares", 8);
     if (layout.estimates[i].bias) {
-      colour(e.name + ".bias", 8);
+      for (const char* half : {"A", "B"}) colour(e.name + ".bias" + half, 8);
       colour(e.name + ".biasSquares", 8);
     }
     if (layout.estimates[i].parts) {

@@ -107,7 +107,7 @@ void planFilm(Plan& plan) {
   bool bias = false;
   for (const PlannedIntegrator& p : plan.integrators) {
     if (!p.integrator->estimatesBias()) continue;
-    plan.filmBytesPerPixel += 48 + (bias ? 0 : 12);
+    plan.filmBytesPerPixel += 72 + (bias ? 0 : 12);
     bias = true;
   }
   const auto separate = std::count_if(plan.integrators.begin(), plan.integrators.end(),
