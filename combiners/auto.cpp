@@ -13,11 +13,11 @@
 #include <algorithm>
 #include <array>
 
+#include "combiners/debias.h"
 #include "combiners/denoise/pw1_filter.h"
 #include "combiners/denoise/pw_filter.h"
 #include "combiners/denoise/variance.h"
 #include "combiners/despike.h"
-#include "combiners/debias.h"
 #include "combiners/error_map.h"
 #include "combiners/finite_float.h"
 #include "combiners/fused_estimate.h"
