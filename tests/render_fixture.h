@@ -47,7 +47,7 @@ inline RenderResult render(SceneData data, const Settings& settings, const Scene
 }
 
 // A path of a file in the repository.
-inline std::string sourcePath(const std::string& path) { return std::string(BRAID_SOURCE_DIR) + "/" + path; }
+inline std::string sourcePath(const std::string& path) { return BRAID_SOURCE_DIR "/" + path; }
 
 inline CameraData cameraAt(const Vec3& from, const Vec3& to, const Vec3& up = Vec3(0, 1, 0)) {
   CameraData camera;
