@@ -9,11 +9,13 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "renderer/scene/gltf.h"
 #include "renderer/scene/scene.h"
 #include "renderer/session/settings.h"
+
+namespace CLI {
+class App;
+}
 
 namespace braid {
 

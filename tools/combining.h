@@ -7,12 +7,14 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "combiners/pipeline.h"
 #include "renderer/film/exr.h"
 #include "renderer/session/integrator.h"
 #include "renderer/session/plan.h"
+
+namespace CLI {
+class App;
+}
 
 namespace braid {
 

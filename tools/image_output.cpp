@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "renderer/core/parallel.h"

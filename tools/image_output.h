@@ -9,10 +9,12 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "renderer/film/exr.h"
 #include "tools/combining.h"
+
+namespace CLI {
+class App;
+}
 
 namespace braid {
 

@@ -2,6 +2,7 @@
 // `braid info`: what a scene file holds.
 #include <set>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 

@@ -6,6 +6,7 @@
 #include <limits>
 #include <new>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "renderer/core/error.h"

@@ -2,6 +2,7 @@
 // `braid merge`: the states of several machines' shares become one, as if one machine had rendered all passes.
 #include <algorithm>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "combiners/registry.h"

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <thread>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "integrators/registry.h"

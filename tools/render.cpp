@@ -3,6 +3,7 @@
 #include <charconv>
 #include <filesystem>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "integrators/registry.h"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `braid replay`: follows one camera path and prints what happens at every vertex. A pass is a pure function of the
 // scene, the seed and its index, so any sample of any render can be looked at again.
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "integrators/path_kernel.h"

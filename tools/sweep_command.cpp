@@ -3,6 +3,8 @@
 #include <iostream>
 #include <set>
 
+#include <CLI/CLI.hpp>
+
 #include "tools/cli.h"
 #include "tools/sweep.h"
 #include "tools/sweep_preset.h"
