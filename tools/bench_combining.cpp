@@ -6,6 +6,7 @@
 
 #include "combiners/pipeline.h"
 #include "integrators/registry.h"
+#include "renderer/core/parallel.h"
 #include "renderer/session/session.h"
 
 namespace braid {
@@ -42,7 +43,7 @@ nlohmann::json benchCombining(const Scene& scene, const CameraData& camera, Sett
   std::map<std::string, std::vector<double>> seconds;
   PipelineResult last;
   for (int k = 0; k < repeats; ++k) {
-    last = runPipeline(*estimates, methods, {});
+    withThreads(settings.threads, [&] { last = runPipeline(*estimates, methods, {}); });
     for (const PipelineOutput& out : last.outputs) seconds[out.step.name].push_back(out.seconds);
   }
   const double megapixels = 1e-6 * estimates->width * estimates->height;
