@@ -33,36 +33,64 @@ struct alignas(64) Windowed {
 // Sums over the window are kept in so many lanes whatever the instruction set, for the same bits everywhere.
 using Unit = float __attribute__((vector_size(kUnit * sizeof(float))));
 
-// By reference: a vector that is returned would take another way in each instruction set.
-void load(const float* p, Unit& out) { std::memcpy(&out, p, sizeof(out)); }
+// Some of the lanes.
+template <int kLanes>
+struct PartOf {
+  typedef float Type __attribute__((vector_size(kLanes * sizeof(float))));
+};
 
-double sumOf(const Unit& lanes) {
-  double sum = 0;
-  for (int l = 0; l < kUnit; ++l) sum += static_cast<double>(lanes[l]);
-  return sum;
+// By reference: a vector that is returned would take another way in each instruction set.
+template <class Lanes>
+void load(const float* p, Lanes& out) {
+  std::memcpy(&out, p, sizeof(out));
 }
 
-// Row kRow of the normal equations: Σ w x_row x_k for k <= kRow, and Σ w x_row u_c.
-template <int kRow>
+template <class Lanes>
+void addLanes(const Lanes& lanes, double& sum) {
+  for (size_t l = 0; l < sizeof(Lanes) / sizeof(float); ++l) sum += static_cast<double>(lanes[l]);
+}
+
+// Row kRow of the normal equations: Σ w x_row x_k for k <= kRow, and Σ w x_row u_c. kLanes of the lanes at a time,
+// which leaves the sums in registers.
+template <int kRow, int kLanes>
 void momentsOfRow(const std::array<Windowed, kColumns>& columns, const Windowed& weights,
                   const std::array<const float*, 3>& u, NormalEquations& out) {
-  Unit products[kRow + 1] = {}, rhs[3] = {};
-  for (int i = 0; i < kCount; i += kUnit) {
-    Unit wx, x;
-    load(weights.v + i, wx);
-    load(columns[kRow].v + i, x);
-    wx *= x;
-    for (int k = 0; k <= kRow; ++k) {
-      load(columns[static_cast<size_t>(k)].v + i, x);
-      products[k] += wx * x;
+  using Part = typename PartOf<kLanes>::Type;
+  double sums[kRow + 4] = {};
+  for (int first = 0; first < kUnit; first += kLanes) {
+    Part products[kRow + 1] = {}, rhs[3] = {};
+    for (int i = first; i < kCount; i += kUnit) {
+      Part wx, x;
+      load(weights.v + i, wx);
+      load(columns[kRow].v + i, x);
+      wx *= x;
+      for (int k = 0; k <= kRow; ++k) {
+        load(columns[static_cast<size_t>(k)].v + i, x);
+        products[k] += wx * x;
+      }
+      for (size_t c = 0; c < 3; ++c) {
+        load(u[c] + i, x);
+        rhs[c] += wx * x;
+      }
     }
-    for (size_t c = 0; c < 3; ++c) {
-      load(u[c] + i, x);
-      rhs[c] += wx * x;
-    }
+    for (int k = 0; k <= kRow; ++k) addLanes(products[k], sums[k]);
+    for (int c = 0; c < 3; ++c) addLanes(rhs[c], sums[kRow + 1 + c]);
   }
-  for (int k = 0; k <= kRow; ++k) out.matrix[kRow][static_cast<size_t>(k)] = sumOf(products[k]);
-  for (size_t c = 0; c < 3; ++c) out.rhs[kRow][c] = sumOf(rhs[c]);
+  for (int k = 0; k <= kRow; ++k) out.matrix[kRow][static_cast<size_t>(k)] = sums[k];
+  for (size_t c = 0; c < 3; ++c) out.rhs[kRow][c] = sums[static_cast<size_t>(kRow) + 1 + c];
+}
+
+template <int kLanes>
+void moments(const std::array<Windowed, kColumns>& columns, const Windowed& weights,
+             const std::array<const float*, 3>& u, NormalEquations& out) {
+  momentsOfRow<0, kLanes>(columns, weights, u, out);
+  momentsOfRow<1, kLanes>(columns, weights, u, out);
+  momentsOfRow<2, kLanes>(columns, weights, u, out);
+  momentsOfRow<3, kLanes>(columns, weights, u, out);
+  momentsOfRow<4, kLanes>(columns, weights, u, out);
+  momentsOfRow<5, kLanes>(columns, weights, u, out);
+  momentsOfRow<6, kLanes>(columns, weights, u, out);
+  momentsOfRow<7, kLanes>(columns, weights, u, out);
 }
 
 // The window, from its first pixel on, of a plane with this pitch. Rows of a fixed length are copied without a call.
@@ -225,14 +253,8 @@ class TileRegression {
     const auto& radiance = radiance_[image];
     const std::array<const float*, 3> u = {radiance[0].v, radiance[1].v, radiance[2].v};
     equations_.size = kColumns;
-    momentsOfRow<0>(columns_, weights_, u, equations_);
-    momentsOfRow<1>(columns_, weights_, u, equations_);
-    momentsOfRow<2>(columns_, weights_, u, equations_);
-    momentsOfRow<3>(columns_, weights_, u, equations_);
-    momentsOfRow<4>(columns_, weights_, u, equations_);
-    momentsOfRow<5>(columns_, weights_, u, equations_);
-    momentsOfRow<6>(columns_, weights_, u, equations_);
-    momentsOfRow<7>(columns_, weights_, u, equations_);
+    vectorLevel() == VectorLevel::Avx512 ? moments<16>(columns_, weights_, u, equations_)
+                                         : moments<8>(columns_, weights_, u, equations_);
     const NormalSolution solution = solve(equations_, kRidge * equations_.matrix[0][0], false);
     for (size_t c = 0; c < 3; ++c) predict(columns_, solution, c, prediction_[c].v);
     return solution;
