@@ -26,7 +26,6 @@ class Fitter {
         capacity_(std::max(256, 2 * job.settings.radius + 1)),
         pitch_((static_cast<size_t>(capacity_) + 15) / 16 * 16 + WindowWeights::kRowSlack),
         rows_(pitch_ / 16 * static_cast<size_t>(rhsRow() + job.colours)),
-        root_(pitch_, 0.0f),
         weights_(job.inputs.terms.size(), std::vector<float>(pitch_, 0.0f)) {}
 
   // Writes size() * colours coefficients of the unscaled features, colour by colour for each. Returns the sum of the
@@ -59,68 +58,82 @@ class Fitter {
     for (int k = 0; k + 1 < size_; ++k) centre_[static_cast<size_t>(k)] = job_.features.row(k, cy)[cx];
   }
 
-  // Root of the summed weights of one row of the window, and the weights themselves.
-  void weigh(int cx, int cy, int y, Span xs) {
+  // Adds a row of the window to the chunk.
+  void append(int cx, int cy, int y, Span xs) {
     for (size_t t = 0; t < weights_.size(); ++t)
       job_.inputs.terms[t].weights->row(cx, cy, y, xs.begin, xs.end, weights_[t].data());
-    for (int x = 0; x < xs.length(); x += kLanes) {
-      FloatLanes sum = loadLanes(&weights_[0][static_cast<size_t>(x)]);
-      for (size_t t = 1; t < weights_.size(); ++t) sum += loadLanes(&weights_[t][static_cast<size_t>(x)]);
-      storeLanes(&root_[static_cast<size_t>(x)], sqrtLanes(sum));
-    }
-    std::fill_n(root_.begin() + xs.length(), kLanes, 0.0f);
+    if (job_.colours == 3)
+      weights_.size() == 1 ? appendRow<3, false>(y, xs) : appendRow<3, true>(y, xs);
+    else
+      weights_.size() == 1 ? appendRow<6, false>(y, xs) : appendRow<6, true>(y, xs);
   }
 
-  void append(int cx, int cy, int y, Span xs) {
-    weigh(cx, cy, y, xs);
-    std::copy_n(root_.begin(), xs.length(), row(0) + filled_);
-    for (size_t g = 0; g < job_.groupEnd.size(); ++g) {
-      const int first = g == 0 ? 0 : job_.groupEnd[g - 1];
-      if (job_.groupEnd[g] - first == 1) appendGroup<1>(first, y, xs, farthest_[g]);
-      if (job_.groupEnd[g] - first == 2) appendGroup<2>(first, y, xs, farthest_[g]);
-      if (job_.groupEnd[g] - first == 3) appendGroup<3>(first, y, xs, farthest_[g]);
-    }
-    for (int x = 0; x < xs.length(); x += kLanes)
-      appendTargets(y, xs.begin + x, x, loadLanes(&root_[static_cast<size_t>(x)]));
-    filled_ += xs.length();
-  }
-
-  // Rows of the feature planes [first, first + N), and their largest squared distance so far.
-  template <int N>
-  void appendGroup(int first, int y, Span xs, FloatLanes& farthest) {
-    const size_t inPitch = job_.features.pitch(), outPitch = pitch_;
-    const float* in = job_.features.row(first, y) + xs.begin;
-    const float* root = root_.data();
-    float* out = row(first + 1) + filled_;
-    std::array<float, N> centre;
-    std::copy_n(centre_.begin() + first, N, centre.begin());
-    FloatLanes largest = farthest;
+  // The same, from its weights, for all rows of the design matrix at once: loops over a few vectors each would wait for
+  // their ends. Lanes past the end of the row are zero.
+  template <size_t kColours, bool kShared>
+  void appendRow(int y, Span xs) {
+    const int planes = job_.features.planes();
+    const float* features = planes > 0 ? job_.features.row(0, y) + xs.begin : weights_[0].data();  // else not read
+    const float* targets = job_.targets.row(0, y) + xs.begin;
+    prefetch(job_.features, features, xs.length());
+    prefetch(job_.targets, targets, xs.length());
     for (int x = 0; x < xs.length(); x += kLanes) {
-      const FloatLanes scale = loadLanes(root + x);
-      FloatLanes distance{};
-      for (size_t k = 0; k < N; ++k) {
-        const FloatLanes d = loadLanes(in + k * inPitch + x) - centre[k];
-        distance += d * d;
-        storeLanes(out + k * outPitch + x, scale * d);
+      const IntLanes inside = laneIndices() < static_cast<float>(xs.length() - x);
+      FloatLanes weight = loadLanes(&weights_[0][static_cast<size_t>(x)]);
+      for (size_t t = 1; kShared && t < weights_.size(); ++t) weight += loadLanes(&weights_[t][static_cast<size_t>(x)]);
+      weight = inside ? weight : FloatLanes{};
+      if (!anyLane(weight >= kLeastWeight)) {
+        appendFeatures<false>(features + x, FloatLanes{}, inside, nullptr);
+        continue;
       }
-      if (xs.length() - x < kLanes)  // lanes past the end of the row
-        distance = laneIndices() < static_cast<float>(xs.length() - x) ? distance : FloatLanes{};
-      largest = maxLanes(largest, distance);
+      const FloatLanes root = sqrtLanes(weight);
+      float* out = row(0) + filled_;
+      storeLanes(out, root);
+      appendFeatures<true>(features + x, root, inside, out + pitch_);
+      appendTargets<kColours, kShared>(targets + x, x, root, row(rhsRow()) + filled_);
+      filled_ += std::min(kLanes, xs.length() - x);
     }
-    farthest = largest;
   }
 
-  void appendTargets(int y, int x, int inRow, FloatLanes root) {
-    const bool shared = weights_.size() > 1;
-    const FloatLanes inverse = shared ? (root > 0.0f ? 1.0f / root : FloatLanes{}) : FloatLanes{};
-    const float* target = job_.targets.row(0, y) + x;
-    const auto colours = static_cast<size_t>(job_.colours);
-    std::array<FloatLanes, NormalEquations::kMaxColours> rhs{};
-    for (const std::vector<float>& weights : weights_) {
-      const FloatLanes scale = shared ? loadLanes(&weights[static_cast<size_t>(inRow)]) * inverse : root;
-      for (size_t c = 0; c < colours; ++c, target += job_.targets.pitch()) rhs[c] += scale * loadLanes(target);
+  // What the window of the next centre reads beyond this one: hundreds of rows are too many for the processor to
+  // foresee (a regression takes 1.13x as long without).
+  static void prefetch(const PackedRows& planes, const float* row, int length) {
+    for (int k = 0; k < planes.planes(); ++k, row += planes.pitch()) __builtin_prefetch(row + length + kLanes);
+  }
+
+  // The largest squared distance in every group so far, and rows sqrt(w) (f - f_c).
+  template <bool kStore>
+  void appendFeatures(const float* in, FloatLanes root, IntLanes inside, float* out) {
+    const size_t inPitch = job_.features.pitch(), outPitch = pitch_, groups = job_.groupEnd.size();
+    const int* groupEnd = job_.groupEnd.data();
+    int k = 0;
+    for (size_t g = 0; g < groups; ++g) {
+      FloatLanes distance{};
+      for (const int end = groupEnd[g]; k < end; ++k, in += inPitch) {
+        const FloatLanes d = loadLanes(in) - centre_[static_cast<size_t>(k)];
+        distance += d * d;
+        if constexpr (kStore) storeLanes(out, root * d), out += outPitch;
+      }
+      farthest_[g] = maxLanes(farthest_[g], inside ? distance : FloatLanes{});
     }
-    for (size_t c = 0; c < colours; ++c) storeLanes(row(rhsRow() + static_cast<int>(c)) + filled_ + inRow, rhs[c]);
+  }
+
+  // Rows sqrt(w) x; with several terms Σ_t w_t x_t / sqrt(w).
+  template <size_t kColours, bool kShared>
+  void appendTargets(const float* target, int x, FloatLanes root, float* out) const {
+    const size_t pitch = job_.targets.pitch();
+    std::array<FloatLanes, kColours> rhs{};
+    if constexpr (kShared) {
+      const FloatLanes inverse = root > 0.0f ? 1.0f / root : FloatLanes{};
+      for (const std::vector<float>& weights : weights_) {
+        const FloatLanes scale = loadLanes(&weights[static_cast<size_t>(x)]) * inverse;
+        for (size_t c = 0; c < kColours; ++c, target += pitch) rhs[c] += scale * loadLanes(target);
+      }
+    } else {
+      for (size_t c = 0; c < kColours; ++c) rhs[c] = root * loadLanes(target + c * pitch);
+    }
+    const size_t outPitch = pitch_;
+    for (size_t c = 0; c < kColours; ++c) storeLanes(out + c * outPitch, rhs[c]);
   }
 
   // Adds the products of the chunk's rows to the sums.
@@ -139,11 +152,13 @@ class Fitter {
     FloatLanes s00 = sums[0], s01 = sums[1], s02 = sums[2], s10 = sums[3], s11 = sums[4], s12 = sums[5];
     FloatLanes s20 = sums[6], s21 = sums[7], s22 = sums[8];
     for (int n = 0; n < filled_; n += kLanes) {
-      const FloatLanes b0 = loadLanes(r0 + n), b1 = loadLanes(r1 + n), b2 = loadLanes(r2 + n);
-      const FloatLanes a0 = loadLanes(l0 + n), a1 = loadLanes(l1 + n), a2 = loadLanes(l2 + n);
-      s00 += a0 * b0, s01 += a0 * b1, s02 += a0 * b2;
-      s10 += a1 * b0, s11 += a1 * b1, s12 += a1 * b2;
-      s20 += a2 * b0, s21 += a2 * b1, s22 += a2 * b2;
+      FloatLanes b0 = loadLanes(r0 + n), b1 = loadLanes(r1 + n), b2 = loadLanes(r2 + n), a = loadLanes(l0 + n);
+      for (FloatLanes* v : {&b0, &b1, &b2, &a}) keepInRegister(*v);
+      s00 += a * b0, s01 += a * b1, s02 += a * b2;
+      keepInRegister(a = loadLanes(l1 + n));
+      s10 += a * b0, s11 += a * b1, s12 += a * b2;
+      keepInRegister(a = loadLanes(l2 + n));
+      s20 += a * b0, s21 += a * b1, s22 += a * b2;
     }
     sums[0] = s00, sums[1] = s01, sums[2] = s02, sums[3] = s10, sums[4] = s11, sums[5] = s12;
     sums[6] = s20, sums[7] = s21, sums[8] = s22;
@@ -201,7 +216,6 @@ class Fitter {
   const size_t pitch_;
   int filled_ = 0;
   std::vector<Line> rows_;
-  std::vector<float> root_;
   std::vector<std::vector<float>> weights_;  // of every term
   std::array<float, RegressionInputs::kMaxFeatures> centre_{};
   static constexpr size_t kMaxColourBlocks = NormalEquations::kMaxColours / kRegisterBlock;

@@ -13,6 +13,9 @@ namespace braid::regression {
 
 static_assert(kLanes <= WindowWeights::kRowSlack && kLanes <= PackedRows::kSlack);
 
+// Pixels of less weight, where the centre's is 1, are nothing: vectors of them are left out.
+constexpr float kLeastWeight = 1e-8f;
+
 // The inputs, packed.
 struct Job {
   const RegressionInputs& inputs;

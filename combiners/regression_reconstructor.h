@@ -105,25 +105,38 @@ class Reconstructor {
   }
 
   // Adds the predictions of one model for one row of its window.
-  template <int N>
+  template <size_t N>
   void predictRow(const float* model, const float* centre, Span xs, int y, int row) {
-    const size_t pitch = job_.features.pitch(), outPitch = pitch_;
-    const int count = job_.features.planes();
-    const float* features = count > 0 ? job_.features.row(0, y) + xs.begin : nullptr;
-    const float* weights = weights_.data();
+    const float* features = job_.features.planes() > 0 ? job_.features.row(0, y) + xs.begin : weights_.data();
     float* out = sum(0, row) + xs.begin;
-    for (int x = 0; x < xs.length(); x += kLanes) {
-      std::array<FloatLanes, N> colour;
-      for (size_t c = 0; c < N; ++c) colour[c] = broadcastLanes(model[c]);
-      for (int k = 0; k < count; ++k) {
-        const FloatLanes d = loadLanes(features + static_cast<size_t>(k) * pitch + x) - centre[k];
-        const float* slope = model + N * (k + 1);
-        for (size_t c = 0; c < N; ++c) colour[c] += d * slope[c];
-      }
-      const FloatLanes w = loadLanes(weights + x);
+    int x = 0;
+    for (; x + 2 * kLanes <= xs.length(); x += 2 * kLanes) predict<N, 2>(model, centre, features + x, x, out + x);
+    for (; x < xs.length(); x += kLanes) predict<N, 1>(model, centre, features + x, x, out + x);
+  }
+
+  // The same for kUnits vectors: two at once, for the coefficients are loaded as often as the features otherwise.
+  template <size_t N, size_t kUnits>
+  void predict(const float* model, const float* centre, const float* features, int x, float* out) const {
+    FloatLanes w[kUnits], colour[N][kUnits], d[kUnits], most{};
+    for (size_t u = 0; u < kUnits; ++u) {
+      w[u] = loadLanes(&weights_[static_cast<size_t>(x) + u * kLanes]);
+      most = maxLanes(most, w[u]);
+    }
+    if (!anyLane(most >= kLeastWeight)) return;
+    for (size_t c = 0; c < N; ++c)
+      for (size_t u = 0; u < kUnits; ++u) colour[c][u] = broadcastLanes(model[c]);
+    const size_t inPitch = job_.features.pitch(), outPitch = pitch_;
+    const float* slope = model + N;
+    for (int k = 0, end = job_.features.planes(); k < end; ++k, slope += N, features += inPitch) {
+      for (size_t u = 0; u < kUnits; ++u) d[u] = loadLanes(features + u * kLanes) - centre[k];
+#pragma GCC unroll 6
       for (size_t c = 0; c < N; ++c)
-        storeLanes(out + c * outPitch + x, loadLanes(out + c * outPitch + x) + w * colour[c]);
-      storeLanes(out + N * outPitch + x, loadLanes(out + N * outPitch + x) + w);
+        for (size_t u = 0; u < kUnits; ++u) colour[c][u] += d[u] * slope[c];
+    }
+    for (size_t u = 0; u < kUnits; ++u, out += kLanes) {
+      for (size_t c = 0; c < N; ++c)
+        storeLanes(out + c * outPitch, loadLanes(out + c * outPitch) + w[u] * colour[c][u]);
+      storeLanes(out + N * outPitch, loadLanes(out + N * outPitch) + w[u]);
     }
   }
 
