@@ -85,7 +85,7 @@ MethodMemory Auto::memory(const MemoryCase& of) const {
   const int fused = of.photonMaps > 0 ? 112 : 0, others = of.bases - of.photonMaps;
   if (of.passes > 0 && of.passes < kFewestPasses) return {48 + fused + 36 * others, 36, 2'300'000};
   const int bases = others + 2;
-  const int secondPass = 305 + 16 * bases;
+  const int secondPass = 353 + 16 * bases;  // 48 of it a copy without outliers
   return {std::max(44 + 88 * bases, secondPass) + fused, 44 + 8 * bases};
 }
 

@@ -18,12 +18,24 @@ constexpr int kWidth = 384, kHeight = 256, kThreads = 2;
 
 double perPixel(int64_t bytes) { return static_cast<double>(bytes) / (kWidth * kHeight); }
 
+// With a lone strong sample in each of the unbiased images: methods that take such out make copies.
 Case caseOf(uint64_t samples) {
   CaseOptions options;
   options.width = kWidth;
   options.height = kHeight;
   options.samples = samples;
-  return makeCase(options);
+  Case c = makeCase(options);
+  for (size_t k = 0; k < 2; ++k) {
+    Estimate& e = c.estimates.estimates[k];
+    for (size_t channel = 0; channel < 3; ++channel) {
+      const size_t i = e.mean[channel].index(100, 50 + 100 * static_cast<int>(k));
+      e.mean[channel][i] += 1000;
+      e.half[1][channel][i] += 2000;
+      if (!e.quarter.empty()) e.quarter[3][channel][i] += 4000;
+      if (!e.variance.empty()) e.variance[channel][i] += 1e6f;
+    }
+  }
+  return c;
 }
 
 // The same with a third of the light direct.
