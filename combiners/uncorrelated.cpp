@@ -3,6 +3,9 @@
 // ones, whose differences are better than its pixels, make one with less noise and hardly any bias
 // (combiners/uncorrelated_filter.h has the formula).
 //
+// Lone strong samples are shared out first, among more pixels than a window has (uncorrelated-share-out;
+// uncorrelated_noise.h).
+//
 // gamma is the candidate whose results differ least between two halves of the samples. The image itself takes its
 // weights from the two halves of the correlated image. Where the correlated image was reconstructed from the samples of
 // the independent one (gradients), each half of the one is combined with the other half of the other instead, and the
@@ -14,9 +17,12 @@
 // rest, the error was 1.07 times that over the eight scenes of path tracing at 8 to 64 samples, and up to 2.6 times
 // that of the better input.
 #include <algorithm>
+#include <optional>
 
+#include "combiners/finite_float.h"
 #include "combiners/registry.h"
 #include "combiners/uncorrelated_groups.h"
+#include "combiners/uncorrelated_noise.h"
 #include "combiners/uncorrelated_share.h"
 
 namespace braid {
@@ -33,6 +39,9 @@ const OptionInfo kMeasured{
     "1: take of the combination what its halves show to be of use, and the plain mean of both images for the "
     "rest; 0: all of it (paper)"};
 
+const OptionInfo kShareOut{"uncorrelated-share-out", 1,
+                           "1: share lone strong samples out among many pixels first, losing no light; 0: the paper"};
+
 class Uncorrelated : public Method {
  public:
   const char* name() const override { return "uncorrelated"; }
@@ -47,13 +56,33 @@ class Uncorrelated : public Method {
     needs.variance = false;
     return needs;
   }
-  MethodMemory memory(const MemoryCase& /*of*/) const override { return {76, 40}; }
-  std::vector<OptionInfo> options() const override { return {kGamma, kMostNoise, kMeasured}; }
+  // 264 of it only where there are lone samples.
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {340, 40}; }
+  std::vector<OptionInfo> options() const override { return {kGamma, kMostNoise, kMeasured, kShareOut}; }
   MethodResult run(const MethodInputs& in) const override;
 };
 
+std::optional<SharedOut> sharedOut(const Estimate& image, const Estimate& other, const MethodOptions& options) {
+  if (options.number(kShareOut) == 0 || image.variance.empty()) return {};
+  return withoutLoneSamples(image, other.mean);
+}
+
+// Adds what was shared out, of which as much is kept as of any other light of its image.
+void addShared(Rgb<float>& combined, const Rgb<float>* ofY, const Rgb<float>* ofZ, const PlainMean& mean,
+               const std::array<Plane<float>, 3>& share) {
+  if (!ofY && !ofZ) return;
+  const Rgb<float> nothing(combined.width(), combined.height());
+  if (!ofY) ofY = &nothing;
+  Rgb<float> light = *ofY;
+  if (!share[0].empty()) takeShare(light, mean, *ofY, ofZ ? *ofZ : nothing, share);
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t i = 0; i < combined.size(); ++i) combined[c][i] = finiteFloat(combined[c][i] + light[c][i]);
+}
+
 MethodResult Uncorrelated::run(const MethodInputs& in) const {
-  const Estimate &y = *in.unbiased, &z = *in.correlated;
+  const std::optional<SharedOut> ofY = sharedOut(*in.unbiased, *in.correlated, in.options);
+  const std::optional<SharedOut> ofZ = sharedOut(*in.correlated, *in.unbiased, in.options);
+  const Estimate &y = ofY ? ofY->image : *in.unbiased, &z = ofZ ? ofZ->image : *in.correlated;
   // Halves of images that share samples are crossed: half A of y meets half B of z, whose quarters make the weights.
   const size_t swap = z.correlation == Correlation::Gradients ? 1 : 0;
   NoiseChoice noise;
@@ -75,6 +104,8 @@ MethodResult Uncorrelated::run(const MethodInputs& in) const {
     share = combinedShares(mean, out.half, levels);
     for (size_t h = 0; h < 2; ++h) takeShare(out.half[h], mean, y.half[h], z.half[h], share);
   }
+  for (size_t h = 0; h < 2; ++h)
+    addShared(out.half[h], ofY ? &ofY->half[h] : nullptr, ofZ ? &ofZ->half[h] : nullptr, mean, share);
   if (swap) {
     out.mean = average(out.half[0], out.half[1]);
     // Both have seen all samples: no halves that are independent of each other, and no error from their difference.
@@ -84,6 +115,7 @@ MethodResult Uncorrelated::run(const MethodInputs& in) const {
     out.mean =
         uncorrelatedFiltered({&y.mean, &z.mean, &z.half[0], &z.half[1], samples, noise.levels, noise.most}, gamma);
     if (measured) takeShare(out.mean, mean, y.mean, z.mean, share);
+    addShared(out.mean, ofY ? &ofY->mean : nullptr, ofZ ? &ofZ->mean : nullptr, mean, share);
     result.error = halvesVariance(out.half);
   }
   result.remarks.push_back(gammaRemark(gamma));

@@ -7,7 +7,6 @@
 #include "combiners/denoise/window.h"
 #include "combiners/finite_float.h"
 #include "combiners/mirror.h"
-#include "combiners/shrinkage.h"
 
 namespace braid {
 
@@ -18,12 +17,6 @@ constexpr float kNeighbours = (2 * kRadius + 1) * (2 * kRadius + 1) - 1;
 constexpr int kBlock = 128;  // columns at a time: the sums of all candidates stay in the first cache
 // Weights below 2^-80 are nothing, and their products would be subnormal numbers, which take hundreds of cycles.
 constexpr float kLowestExponent = -80;
-// The square of a mean in units of its variance from which on it is that of several strong samples, not of one to
-// three.
-constexpr double kEstablished = 4;
-// Neighbours of the eight that have to be as uncertain, within the factor, for a strong sample to be no outlier.
-constexpr int kFellows = 3;
-constexpr float kFellowFactor = 16;
 constexpr size_t kCandidates = kUncorrelatedGammas.size();
 
 // a - b with mirrored pixels around it.
@@ -154,33 +147,7 @@ void addRowScores(const Padded (&in)[2], const UncorrelatedInputs (&groups)[2], 
   }
 }
 
-// Whether the variance at pixel (x, y) is also that of its neighbourhood.
-bool hasFellows(const Plane<float>& variance, int x, int y) {
-  int fellows = 0;
-  for (int v = std::max(0, y - 1); v <= std::min(variance.height - 1, y + 1); ++v)
-    for (int u = std::max(0, x - 1); u <= std::min(variance.width - 1, x + 1); ++u)
-      if ((u != x || v != y) && kFellowFactor * variance.at(u, v) >= variance.at(x, y)) ++fellows;
-  return fellows >= kFellows;
-}
-
 }  // namespace
-
-Rgb<float> noiseLevels(const Rgb<float>& mean, const Rgb<float>& variance) {
-  Rgb<float> out(mean.width(), mean.height(), kUnfilled);
-  for (size_t c = 0; c < 3; ++c) {
-    const Plane<float> around = usualVariance(variance[c]);
-    parallelRows(out.height(), [&](int y) {
-      for (int x = 0; x < out.width(); ++x) {
-        const size_t i = out[c].index(x, y);
-        const auto own = static_cast<double>(variance[c][i]);
-        const bool established =
-            kEstablished * own <= sqr(static_cast<double>(mean[c][i])) || hasFellows(variance[c], x, y);
-        out[c][i] = established ? std::max(variance[c][i], around[i]) : around[i];
-      }
-    });
-  }
-  return out;
-}
 
 Rgb<float> uncorrelatedFiltered(const UncorrelatedInputs& in, double gamma) {
   const Rgb<float>& y = *in.independent;

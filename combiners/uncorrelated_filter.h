@@ -15,6 +15,7 @@
 // at 16 samples). Few neighbours keep glossy reflections of lamps from harm, many find caustics, whose pixels are as
 // uncertain: with pairs of up to 224, 100 and 30 times the variance plates at 16 samples have 1.33, 0.97 and 0.60 times
 // the error of the better input, glass of water 0.04, 0.16 and 0.18 times, and up to 20 times more in single runs.
+// What is uncertain, and what becomes of single strong samples, is for uncorrelated_noise.h to say.
 #pragma once
 
 #include <array>
@@ -38,12 +39,6 @@ struct UncorrelatedInputs {
   const Rgb<float>* noise = nullptr;
   double mostNoise = 0;
 };
-
-// How uncertain pixels are, from their mean and its variance: their variance or usualVariance() around them, whichever
-// is larger, for a pixel may be without any by chance; and the latter alone where the mean is below twice its
-// deviation, as that of one rare strong sample is, unless three of the eight neighbours have a sixteenth of its
-// variance or more: rare samples seldom meet, those of a lamp's mirror image do.
-Rgb<float> noiseLevels(const Rgb<float>& mean, const Rgb<float>& variance);
 
 // The combination for one gamma >= 0. With gamma 0 all k_i are 1/224 and the centre keeps nothing.
 Rgb<float> uncorrelatedFiltered(const UncorrelatedInputs& in, double gamma);

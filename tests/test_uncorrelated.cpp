@@ -2,6 +2,7 @@
 // Uncorrelated weighting and its two baselines: the weights themselves by impulses, the invariances that make them
 // unbiased, edges under perfect correlation, and bias and noise over replicated renders.
 #include <cmath>
+#include <optional>
 #include <random>
 
 #include <doctest/doctest.h>
@@ -10,6 +11,7 @@
 #include "combiners/registry.h"
 #include "combiners/uncorrelated_filter.h"
 #include "combiners/uncorrelated_groups.h"
+#include "combiners/uncorrelated_noise.h"
 #include "tests/combiner_fixture.h"
 
 using namespace braid;
@@ -274,6 +276,64 @@ TEST_CASE("Strong samples of neighbours are a lamp: theirs is the noise of the p
     CHECK(lone[c].at(kLamp + 4, kLamp) - 0.1f > 0.02f);
     CHECK(lamp[c].at(kLamp + 4, kLamp) == doctest::Approx(0.1));
   }
+}
+
+TEST_CASE("Lone strong samples that the other image knows nothing of are shared out, and no light is lost") {
+  for (const auto& [width, height] : {std::array{90, 70}, {7, 3}}) {
+    CAPTURE(width);
+    Estimate y;
+    y.mean = y.half[0] = y.half[1] = Rgb<float>(width, height, 0.1f);
+    y.variance = Rgb<float>(width, height, 1e-4f);
+    y.quarter.assign(4, y.mean);
+    const Rgb<float> z(width, height, 0.12f);
+    CHECK_FALSE(withoutLoneSamples(y, z));
+    // One in the last quarter, at a corner, of green alone.
+    y.mean[1].at(0, 0) += 50;
+    y.half[1][1].at(0, 0) += 100;
+    y.quarter[3][1].at(0, 0) += 200;
+    y.variance[1].at(0, 0) = 2500;
+    Rgb<float> aware = z;
+    aware[1].at(0, 0) = 6;
+    CHECK_FALSE(withoutLoneSamples(y, aware));
+    const std::optional<SharedOut> out = withoutLoneSamples(y, z);
+    REQUIRE(out);
+    CHECK(identical(out->image.mean[0], y.mean[0]));
+    CHECK(out->image.variance[1].at(0, 0) < 0.01f);
+    for (const Rgb<float>& quarter : out->image.quarter) CHECK(quarter[1].at(0, 0) == z[1].at(0, 0));
+    const int columns = std::min(32, width), rows = std::min(32, height);
+    const auto check = [&](const Plane<float>& image, const Plane<float>& shares, double sample) {
+      CHECK(image.at(0, 0) == z[1].at(0, 0));
+      CHECK(image.at(1, 0) == 0.1f);
+      double sum = 0;
+      for (const float v : shares.data) sum += static_cast<double>(v);
+      CHECK(sum == doctest::Approx(sample - 0.02).epsilon(1e-4));
+      CHECK(static_cast<double>(shares.at(columns - 1, rows - 1)) ==
+            doctest::Approx((sample - 0.02) / (columns * rows)).epsilon(1e-4));
+      if (width > columns) CHECK(shares.at(columns, 0) == 0.0f);
+    };
+    check(out->image.mean[1], out->mean[1], 50);
+    check(out->image.half[0][1], out->half[0][1], 0);
+    check(out->image.half[1][1], out->half[1][1], 100);
+  }
+}
+
+TEST_CASE("What several samples make, or neighbours, is no lone sample") {
+  Estimate y;
+  y.mean = y.half[0] = y.half[1] = Rgb<float>(40, 40, 0.1f);
+  y.variance = Rgb<float>(40, 40, 1e-4f);
+  const Rgb<float> z = y.mean;
+  y.mean[0].at(20, 20) = 50;
+  y.variance[0].at(20, 20) = 625;  // a mean of twice its deviation
+  CHECK_FALSE(withoutLoneSamples(y, z));
+  y.variance[0].at(20, 20) = 700;
+  CHECK(withoutLoneSamples(y, z));
+  // Three neighbours with a sixteenth of its variance, themselves of means that count.
+  for (const auto& [u, v] : {std::pair{19, 20}, {21, 20}, {20, 21}}) {
+    CHECK(withoutLoneSamples(y, z));
+    y.mean[0].at(u, v) = 20;
+    y.variance[0].at(u, v) = 50;
+  }
+  CHECK_FALSE(withoutLoneSamples(y, z));
 }
 
 TEST_CASE("Images from gradients are crossed: their halves meet the other halves of the samples") {
