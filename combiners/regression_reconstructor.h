@@ -107,7 +107,8 @@ class Reconstructor {
   // Adds the predictions of one model for one row of its window.
   template <size_t N>
   void predictRow(const float* model, const float* centre, Span xs, int y, int row) {
-    const float* features = job_.features.planes() > 0 ? job_.features.row(0, y) + xs.begin : weights_.data();
+    const float* features =
+        job_.features.planes() > 0 ? job_.features.row(0, y) + xs.begin : weights_.data();  // else not read
     float* out = sum(0, row) + xs.begin;
     int x = 0;
     for (; x + 2 * kLanes <= xs.length(); x += 2 * kLanes) predict<N, 2>(model, centre, features + x, x, out + x);
