@@ -168,7 +168,8 @@ MethodInputs Runner::inputsOf(const Step& step) const {
   }
   const PipelineOutput* maker = result.find(step.biased);
   if (maker && maker->step.method->kind() == MethodKind::Denoiser) {
-    const MethodInputs again = inputsOf(maker->step);
+    MethodInputs again = inputsOf(maker->step);
+    again.meanOnly = true;
     in.redenoise = [again, method = maker->step.method](const Rgb<float>& image) {
       const Estimate moved = withMean(*again.unbiased, image);
       MethodInputs other = again;

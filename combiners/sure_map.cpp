@@ -10,6 +10,7 @@
 #include "combiners/plane_mean.h"
 #include "renderer/core/hash.h"
 #include "renderer/core/parallel.h"
+#include "renderer/core/vectorised.h"
 
 namespace braid {
 
@@ -31,6 +32,11 @@ void forAllValues(const Rgb<float>& image, const Body& body) {
     parallelChunks(image.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) body(c, i);
     });
+}
+
+// sum[x] += weight in[x]
+void addWeighted(double weight, const double* __restrict in, int count, double* __restrict sum) {
+  for (int x = 0; x < count; ++x) sum[x] += weight * in[x];
 }
 
 }  // namespace
@@ -77,22 +83,25 @@ Plane<float> gaussianFiltered(const Plane<float>& in, double sigma) {
     total += weight[static_cast<size_t>(d + kRadius)] = std::exp(-0.5 * d * d / (sigma * sigma));
   for (double& w : weight) w /= total;
   const int width = in.width, height = in.height;
-  const auto filtered = [&](const auto& from, auto& to, int dx, int dy) {
-    parallelRows(height, [&](int y) {
-      for (int x = 0; x < width; ++x) {
-        double sum = 0;
-        for (int d = -kRadius; d <= kRadius; ++d)
-          sum +=
-              weight[static_cast<size_t>(d + kRadius)] *
-              static_cast<double>(from.at(std::clamp(x + d * dx, 0, width - 1), std::clamp(y + d * dy, 0, height - 1)));
-        to.at(x, y) = static_cast<std::decay_t<decltype(to.at(x, y))>>(sum);
-      }
-    });
-  };
   Plane<double> rows(width, height);
+  parallelRows(height, [&](int y) {
+    std::vector<double> padded(static_cast<size_t>(width + 2 * kRadius));
+    for (int x = 0; x < width + 2 * kRadius; ++x)
+      padded[static_cast<size_t>(x)] = static_cast<double>(in.at(std::clamp(x - kRadius, 0, width - 1), y));
+    runVectorised([&] {
+      for (size_t d = 0; d < weight.size(); ++d) addWeighted(weight[d], padded.data() + d, width, &rows.at(0, y));
+    });
+  });
   Plane<float> out(width, height);
-  filtered(in, rows, 1, 0);
-  filtered(rows, out, 0, 1);
+  parallelRows(height, [&](int y) {
+    std::vector<double> sums(static_cast<size_t>(width), 0.0);
+    runVectorised([&] {
+      for (int d = -kRadius; d <= kRadius; ++d)
+        addWeighted(weight[static_cast<size_t>(d + kRadius)], &rows.at(0, std::clamp(y + d, 0, height - 1)), width,
+                    sums.data());
+    });
+    for (int x = 0; x < width; ++x) out.at(x, y) = static_cast<float>(sums[static_cast<size_t>(x)]);
+  });
   return out;
 }
 

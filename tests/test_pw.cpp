@@ -10,6 +10,7 @@
 #include "combiners/denoise/pw_filter.h"
 #include "combiners/denoise/pw_method.h"
 #include "combiners/denoise/variance.h"
+#include "combiners/registry.h"
 #include "renderer/core/error.h"
 #include "tests/combiner_fixture.h"
 #include "tests/plain_window.h"
@@ -437,6 +438,21 @@ TEST_CASE("Two and three passes are denoised by the variance of the halves, one 
     CHECK(allFinite(result.image.half[1]));
   }
   CHECK_THROWS_AS(method->run(inputsOf(caseOf(16, 12, 1))), Error);
+}
+
+TEST_CASE("Where only the mean is read, halves are left out and the mean keeps its bits") {
+  const Case c = caseOf(70, 40, 8);
+  for (const auto& make : {make_pw, make_pw1, make_nlm, make_box}) {
+    const std::unique_ptr<Method> method = make();
+    CAPTURE(method->name());
+    MethodInputs in = inputsOf(c);
+    const MethodResult all = method->run(in);
+    in.meanOnly = true;
+    const MethodResult meanOnly = method->run(in);
+    CHECK_FALSE(all.image.half[1].empty());
+    CHECK(meanOnly.image.half[1].empty());
+    for (size_t k = 0; k < 3; ++k) CHECK(meanOnly.image.mean[k].data == all.image.mean[k].data);
+  }
 }
 
 TEST_CASE("Planes that an image of another renderer lacks are done without") {

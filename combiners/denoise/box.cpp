@@ -39,7 +39,7 @@ class Box : public Method {
     const int radius = static_cast<int>(std::clamp(in.options.number(kRadius), 0.0, 1000.0));
     MethodResult result;
     result.image.mean = boxFiltered(in.unbiased->mean, radius);
-    for (int h = 0; h < 2; ++h) result.image.half[h] = boxFiltered(in.unbiased->half[h], radius);
+    for (int h = 0; h < 2 && !in.meanOnly; ++h) result.image.half[h] = boxFiltered(in.unbiased->half[h], radius);
     return result;
   }
 };

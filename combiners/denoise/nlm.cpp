@@ -55,7 +55,7 @@ class NonLocalMeans : public Method {
     };
     MethodResult result;
     result.image.mean = filtered(e.mean, 1);
-    if (!e.half[0].empty() && !e.half[1].empty())
+    if (!in.meanOnly && !e.half[0].empty() && !e.half[1].empty())
       for (int h = 0; h < 2; ++h) result.image.half[h] = filtered(e.half[h], 2);
     return result;
   }

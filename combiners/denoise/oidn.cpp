@@ -136,7 +136,7 @@ class Oidn : public OutsideMethod {
     result.image.mean =
         device.denoise(in.unbiased->mean, albedo ? &albedo->mean : nullptr, normal ? &normal->mean : nullptr);
     for (int h = 0; h < 2; ++h)
-      if (!in.unbiased->half[h].empty())
+      if (!in.meanOnly && !in.unbiased->half[h].empty())
         result.image.half[h] = device.denoise(in.unbiased->half[h], albedo ? &albedo->half[h] : nullptr,
                                               normal ? &normal->half[h] : nullptr);
     return result;

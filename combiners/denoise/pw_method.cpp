@@ -53,6 +53,7 @@ PatchWelchInput patchWelchInputOf(const MethodInputs& in, const std::string& met
   PatchWelchInput input = patchWelchInput(*in.unbiased, in.features);
   if (input.variance.empty())
     throw Error(ExitCode::BadInput, method + " needs the variance of its input, or the halves of at least two passes");
+  if (in.meanOnly) input.images.resize(1);
   return input;
 }
 
