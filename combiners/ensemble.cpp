@@ -29,6 +29,8 @@ const OptionInfo kRelative{
 const OptionInfo kPrior{"ensemble-prior", 6,
                         "Pull of noise towards equal weights: 6 for weights that may be anything; 0: the paper's"};
 
+constexpr double kImprovement = 1e-6;  // weights to 1e-9 of the error change nothing but the time
+
 // Fewer passes leave too few in each half to tell the bases apart.
 constexpr uint64_t kFewestPasses = 8;
 
@@ -56,6 +58,7 @@ class Ensemble : public Method {
 
 EnsembleChoices choicesOf(const MethodOptions& options) {
   EnsembleChoices choices;
+  choices.improvement = kImprovement;
   choices.patchRadius = static_cast<int>(std::clamp(options.number(kPatch), 1.0, 101.0)) / 2;
   choices.shared = options.number(kShared) != 0;
   choices.nonNegative = options.number(kNonNegative) != 0;

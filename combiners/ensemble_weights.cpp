@@ -46,6 +46,7 @@ class TileWeights {
   void addProducts(size_t i, size_t j, size_t channels);
   void sumAlongRows();
   void writeWeights(size_t c, WeightMaps& out);
+  void fillMatrices(SimplexSolver& solver, int row, int column, int lanes);
   void fillBlock(int column, int row, float weight, Plane<float>& out) const;
 
   const Estimate& x_;
@@ -143,28 +144,32 @@ void TileWeights::sumAlongRows() {
 // Solves for all blocks of the tile; the weights are those of channel c, or of all.
 void TileWeights::writeWeights(size_t c, WeightMaps& out) {
   SimplexSolver solver(bases_.size(), choices_.nonNegative, choices_.improvement);
-  const int blocks = rows_ * columns_, stride = choices_.stride;
+  for (int row = 0; row < rows_; ++row)
+    for (int column = 0; column < columns_; column += SimplexSolver::kLanes) {
+      const int lanes = std::min(SimplexSolver::kLanes, columns_ - column);
+      fillMatrices(solver, row, column, lanes);
+      solver.solve();
+      for (size_t b = 0; b < bases_.size(); ++b)
+        for (int l = 0; l < lanes; ++l)
+          fillBlock(column + l, row, static_cast<float>(solver.weight(b)[l]), out.of(b, c));
+    }
+}
+
+// M of the blocks from (column, row) on.
+void TileWeights::fillMatrices(SimplexSolver& solver, int row, int column, int lanes) {
+  const int stride = choices_.stride;
   const double channels = choices_.shared ? 3 : 1;
-  for (int begin = 0; begin < blocks; begin += SimplexSolver::kLanes) {
-    const int lanes = std::min(SimplexSolver::kLanes, blocks - begin);
-    size_t pair = 0;
-    for (size_t i = 0; i < bases_.size(); ++i)
-      for (size_t j = 0; j <= i; ++j, ++pair) {
-        double* to = solver.entry(i, j);
-        std::fill_n(to, SimplexSolver::kLanes, 0.0);
-        for (int l = 0; l < lanes; ++l) {
-          const int row = (begin + l) / columns_, x = (begin + l) % columns_ * stride;
-          to[l] = sumsOfRow(pair, row)[x];
-          if (i == j && noise_.size() > 0)
-            to[l] += channels * static_cast<double>(noise_.at(tile_.x0 + x, tile_.y0 + row * stride));
-        }
-      }
-    solver.solve();
-    for (size_t b = 0; b < bases_.size(); ++b)
-      for (int l = 0; l < lanes; ++l)
-        fillBlock((begin + l) % columns_, (begin + l) / columns_, static_cast<float>(solver.weight(b)[l]),
-                  out.of(b, c));
-  }
+  const float* noise = noise_.size() > 0 ? rowOf(noise_, tile_.x0, tile_.y0 + row * stride) : nullptr;
+  size_t pair = 0;
+  for (size_t i = 0; i < bases_.size(); ++i)
+    for (size_t j = 0; j <= i; ++j, ++pair) {
+      double* to = solver.entry(i, j);
+      const double* sums = sumsOfRow(pair, row);
+      std::fill_n(to, SimplexSolver::kLanes, 0.0);
+      for (int l = 0; l < lanes; ++l) to[l] = sums[(column + l) * stride];
+      if (i != j || !noise) continue;
+      for (int l = 0; l < lanes; ++l) to[l] += channels * static_cast<double>(noise[(column + l) * stride]);
+    }
 }
 
 void TileWeights::fillBlock(int column, int row, float weight, Plane<float>& out) const {

@@ -80,9 +80,24 @@ bool SimplexSolver::converged() const {
   return done;
 }
 
+// The minimum of curvature w² - 2 slope w + M_11, of which w_0 = w and w_1 = 1 - w are the weights.
+void SimplexSolver::solveTwo() {
+  const double *m00 = entry(0, 0), *m01 = entry(0, 1), *m11 = entry(1, 1);
+  const double high = nonNegative_ ? 1.0 : kMostWeight, low = 1 - high;
+  double *w0 = weights_.data(), *w1 = w0 + kLanes;
+  for (int l = 0; l < kLanes; ++l) {
+    const double slope = m11[l] - m01[l], curvature = m00[l] - 2 * m01[l] + m11[l], tiny = kFlat * scale_[l];
+    const double best = std::min(std::max(slope / (curvature > tiny ? curvature : 1.0), low), high);
+    const double end = curvature * (high + low) < 2 * slope ? high : low;
+    w0[l] = curvature > tiny ? best : curvature < -tiny ? end : 0.5;
+    w1[l] = 1 - w0[l];
+  }
+}
+
 void SimplexSolver::solve() {
   runVectorised([&] {
     completeMatrix();
+    if (n_ == 2) return solveTwo();
     std::fill(weights_.begin(), weights_.end(), 1.0 / static_cast<double>(n_));
     multiply();
     for (size_t steps = 0; steps < kMostSteps; steps += n_) {

@@ -5,7 +5,7 @@
 //   w <- (1 - alpha) w + alpha e_i,   alpha = (wᵀMw - (Mw)_i) / (wᵀMw - 2 (Mw)_i + M_ii),
 // which is Eq. (29) where M comes from one pixel. Unlike in the paper the start is 1/N and the order fixed, so that the
 // result is a function of M, and a line also goes on beyond w, away from vertex i, until w_i is 0: without that step,
-// minima on faces of the simplex are approached in an endless zigzag.
+// minima on faces of the simplex are approached in an endless zigzag. Of two denoisers the minimum is known (Eq. 29).
 #pragma once
 
 #include <cstddef>
@@ -34,6 +34,7 @@ class SimplexSolver {
   void completeMatrix();
   void multiply();
   void searchLine(size_t i);
+  void solveTwo();
   bool converged() const;
 
   size_t n_;
