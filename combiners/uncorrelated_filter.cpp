@@ -7,6 +7,8 @@
 #include "combiners/denoise/window.h"
 #include "combiners/finite_float.h"
 #include "combiners/mirror.h"
+#include "combiners/packed_rows.h"
+#include "combiners/pair_rows.h"
 
 namespace braid {
 
@@ -14,9 +16,13 @@ namespace {
 
 constexpr int kRadius = 7;
 constexpr float kNeighbours = (2 * kRadius + 1) * (2 * kRadius + 1) - 1;
+constexpr int kTileWidth = 128, kTileHeight = 32;
+// Pairs at a time, past the end of a row as well: what is left over of vectors would take as long as they all.
+constexpr int kUnit = 8;
+static_assert(kUnit <= PackedRows::kSlack);
 constexpr int kBlock = 128;  // columns at a time: the sums of all candidates stay in the first cache
 // Weights below 2^-80 are nothing, and their products would be subnormal numbers, which take hundreds of cycles.
-constexpr float kLowestExponent = -80;
+constexpr int kLowestExponent = -80;
 constexpr size_t kCandidates = kUncorrelatedGammas.size();
 
 // a - b with mirrored pixels around it.
@@ -28,29 +34,35 @@ Plane<float> paddedDifference(const Plane<float>& a, const Plane<float>& b) {
   return mirrorPadded(out, kRadius);
 }
 
-// h and g of one channel, and the noise of its pixels: none if neighbours are not chosen by it.
-struct Padded {
-  Plane<float> h, g, noise;
-};
-Padded padded(const UncorrelatedInputs& in, size_t c) {
-  const Plane<float> nothing(in.first->width(), in.first->height());
-  return {paddedDifference((*in.first)[c], (*in.second)[c]),
-          paddedDifference((*in.correlated)[c], (*in.independent)[c]),
-          mirrorPadded(in.noise ? (*in.noise)[c] : nothing, kRadius)};
-}
-
-// Rows of a padded plane: at pixel (x, y) of the image, and at its neighbour.
-const float* rowOf(const Plane<float>& padded, int x, int y) {
-  return padded.data.data() + padded.index(x + kRadius, y + kRadius);
-}
-
-// A row of pixels of a padded plane set: at (x, y) of the image, or at their neighbours.
+// Pixels of one row from some column on: h, g and the noise.
 struct Pixels {
   const float *h, *g, *noise;
 };
-Pixels pixelsAt(const Padded& in, int x, int y) {
-  return {rowOf(in.h, x, y), rowOf(in.g, x, y), rowOf(in.noise, x, y)};
-}
+
+// h and g of one channel, and the noise of its pixels: none if neighbours are not chosen by it.
+class Padded {
+ public:
+  Padded(const UncorrelatedInputs& in, size_t c)
+      : width_(in.first->width()), height_(in.first->height()), rows_(packed(in, c)) {}
+  // The image, and with the pixels around it.
+  PixelRect image() const { return {0, 0, width_, height_}; }
+  PixelRect around() const { return grown(image(), kRadius); }
+  Pixels at(int x, int y) const {
+    const float* h = rows_.row(0, y + kRadius) + x + kRadius;
+    return {h, h + rows_.pitch(), h + 2 * rows_.pitch()};
+  }
+
+ private:
+  static PackedRows packed(const UncorrelatedInputs& in, size_t c) {
+    const Plane<float> h = paddedDifference((*in.first)[c], (*in.second)[c]);
+    const Plane<float> g = paddedDifference((*in.correlated)[c], (*in.independent)[c]);
+    const Plane<float> noise = in.noise ? mirrorPadded((*in.noise)[c], kRadius) : Plane<float>(h.width, h.height);
+    return PackedRows({&h, &g, &noise});
+  }
+
+  int width_, height_;
+  PackedRows rows_;
+};
 
 // How the differences of h make weights: k = exp2(gamma `exponent` (h_c - h_i)²).
 struct Weighting {
@@ -67,19 +79,42 @@ Weighting weightingOf(const UncorrelatedInputs& in, double gamma) {
   return {-static_cast<float>(gamma * in.samples) * kLog2E, static_cast<float>(in.mostNoise)};
 }
 
-// Adds the terms of one neighbour for `count` pixels of a row to the sums of one gamma, which `by` holds already.
-void addOne(const Pixels& centre, const Pixels& neighbour, Weighting by, int count, float* __restrict sum) {
-  const float* __restrict hc = centre.h, * __restrict hi = neighbour.h;
-  const float* __restrict gc = centre.g, * __restrict gi = neighbour.g;
-  const float* __restrict nc = centre.noise, * __restrict ni = neighbour.noise;
+// k (g_p - g_q) of `count` pairs of one gamma, which `by` holds already.
+void termsOfRow(const Pixels& first, const Pixels& second, Weighting by, int count, float* __restrict out) {
+  const float* __restrict hp = first.h, * __restrict hq = second.h;
+  const float* __restrict gp = first.g, * __restrict gq = second.g;
+  const float* __restrict np = first.noise, * __restrict nq = second.noise;
   for (int x = 0; x < count; ++x) {
-    const float e = exponentOf(hc[x] - hi[x], nc[x], ni[x], by);
-    sum[x] += exp2NonPositive(std::max(e, kLowestExponent)) * (gc[x] - gi[x]);
+    const float e = exponentOf(hp[x] - hq[x], np[x], nq[x], by);
+    out[x] = exp2NonPositive<kLowestExponent>(e) * (gp[x] - gq[x]);
   }
 }
 
-// The same for all candidates. Three exponentials are enough, the other weights are products of them. Weights below
-// 10⁻¹⁸ are raised to it before they are multiplied, so that no product is subnormal.
+// Σ k (g_c - g_i) of one gamma for the pixels of a tile, row by row. What a pair adds to one of its pixels, it takes
+// from the other.
+void tileSums(const Padded& in, const Weighting& by, const PixelRect& tile, float* sums) {
+  const auto at = [&](int x, int y) { return sums + static_cast<ptrdiff_t>(y - tile.y0) * tile.width() + x - tile.x0; };
+  forPairRows(tile, in.around(), kRadius, 1, [&](const PairRow& row) {
+    const Columns all = row.all();
+    float terms[kTileWidth + kRadius + kUnit];
+    termsOfRow(in.at(all.begin, row.y), in.at(all.begin + row.dx, row.y + row.dy), by, roundUp(all.count(), kUnit),
+               terms);
+    if (!row.first.empty()) {
+      float* __restrict sum = at(row.first.begin, row.y);
+      const float* __restrict term = terms + (row.first.begin - all.begin);
+      for (int x = 0; x < row.first.count(); ++x) sum[x] += term[x];
+    }
+    if (!row.second.empty()) {
+      float* __restrict sum = at(row.second.begin + row.dx, row.y + row.dy);
+      const float* __restrict term = terms + (row.second.begin - all.begin);
+      for (int x = 0; x < row.second.count(); ++x) sum[x] -= term[x];
+    }
+  });
+}
+
+// Adds the terms of one neighbour for `count` pixels of a row to the sums of all candidates. Three exponentials are
+// enough, the other weights are products of them. Weights below 10⁻¹⁸ are raised to it before they are multiplied, so
+// that no product is subnormal.
 void addAll(const Pixels& centre, const Pixels& neighbour, Weighting by, int count,
             float (&__restrict sums)[kCandidates][kBlock]) {
   constexpr float kTiny = 1e-18f;
@@ -88,7 +123,7 @@ void addAll(const Pixels& centre, const Pixels& neighbour, Weighting by, int cou
   const float* __restrict nc = centre.noise, * __restrict ni = neighbour.noise;
   for (int x = 0; x < count; ++x) {
     const float g = gc[x] - gi[x], e = exponentOf(hc[x] - hi[x], nc[x], ni[x], by);
-    const float k001 = exp2NonPositive(std::max(0.01f * e, kLowestExponent));
+    const float k001 = exp2NonPositive<kLowestExponent>(0.01f * e);
     const float k0025 = std::max(exp2NonPositive(0.025f * e), kTiny), k005 = std::max(k0025 * k0025, kTiny);
     const float k01 = std::max(k005 * k005, kTiny), k02 = k01 * k01;
     const float k05 = std::max(exp2NonPositive(0.5f * e), kTiny), k1 = std::max(k05 * k05, kTiny);
@@ -109,10 +144,10 @@ void addAll(const Pixels& centre, const Pixels& neighbour, Weighting by, int cou
 // Calls add(pixels, neighbours) for every neighbour of the pixels from (x0, y) on.
 template <class Add>
 void forNeighbours(const Padded& in, int x0, int y, const Add& add) {
-  const Pixels centre = pixelsAt(in, x0, y);
+  const Pixels centre = in.at(x0, y);
   for (int dy = -kRadius; dy <= kRadius; ++dy)
     for (int dx = -kRadius; dx <= kRadius; ++dx)
-      if (dx != 0 || dy != 0) add(centre, pixelsAt(in, x0 + dx, y + dy));
+      if (dx != 0 || dy != 0) add(centre, in.at(x0 + dx, y + dy));
 }
 
 // Σ k (g_c - g_i) / 224 of every candidate for `count` pixels of row y.
@@ -151,23 +186,16 @@ void addRowScores(const Padded (&in)[2], const UncorrelatedInputs (&groups)[2], 
 
 Rgb<float> uncorrelatedFiltered(const UncorrelatedInputs& in, double gamma) {
   const Rgb<float>& y = *in.independent;
-  const int width = y.width();
   const Weighting by = weightingOf(in, gamma);
-  Rgb<float> out(width, y.height());
+  Rgb<float> out(y.width(), y.height());
   for (size_t c = 0; c < 3; ++c) {
-    const Padded planes = padded(in, c);
-    parallelRows(y.height(), [&](int row) {
-      float sum[kBlock];
-      for (int x0 = 0; x0 < width; x0 += kBlock) {
-        const int count = std::min(kBlock, width - x0);
-        std::fill_n(sum, kBlock, 0.0f);
-        runVectorised([&] {
-          forNeighbours(planes, x0, row, [&](const Pixels& centre, const Pixels& neighbour) {
-            addOne(centre, neighbour, by, count, sum);
-          });
-        });
-        for (int x = 0; x < count; ++x) out[c].at(x0 + x, row) = y[c].at(x0 + x, row) + sum[x] / kNeighbours;
-      }
+    const Padded planes(in, c);
+    forEachTile(y.width(), y.height(), kTileWidth, kTileHeight, [&](const PixelRect& tile) {
+      std::vector<float> sums(static_cast<size_t>(tile.width()) * static_cast<size_t>(tile.height()), 0.0f);
+      runVectorised([&] { tileSums(planes, by, tile, sums.data()); });
+      const float* sum = sums.data();
+      for (int row = tile.y0; row < tile.y1; ++row)
+        for (int x = tile.x0; x < tile.x1; ++x) out[c].at(x, row) = y[c].at(x, row) + *sum++ / kNeighbours;
     });
   }
   return out;
@@ -189,7 +217,7 @@ std::array<double, kCandidates> uncorrelatedScores(const UncorrelatedInputs (&gr
   const int height = guide.height(), rows = (height + rowStep - 1) / rowStep;
   std::array<double, kCandidates> total{};
   for (size_t c = 0; c < 3; ++c) {
-    const Padded planes[2] = {padded(groups[0], c), padded(groups[1], c)};
+    const Padded planes[2] = {{groups[0], c}, {groups[1], c}};
     const Plane<double> level = mirrorBoxMean(guide[c], kRadius);
     std::vector<std::array<double, kCandidates>> ofRow(static_cast<size_t>(rows));
     parallelRows(rows, [&](int r) {

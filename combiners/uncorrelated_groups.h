@@ -2,6 +2,7 @@
 // What the methods of uncorrelated weighting share: the groups of quarters, and the search for gamma.
 #pragma once
 
+#include <algorithm>
 #include <string>
 
 #include "combiners/denoise/variance.h"
@@ -30,12 +31,14 @@ inline UncorrelatedInputs uncorrelatedGroup(const Estimate& y, const Estimate& z
           noise.most};
 }
 
-// The option when it is set, or else the best gamma for these groups. Large images vote with every fourth row.
+// The option when it is set, or else the best gamma for these groups. 2^15 pixels vote, in rows so near to each other
+// that their windows cover the image.
 inline double chosenGamma(const MethodInputs& in, const OptionInfo& option, const UncorrelatedInputs (&groups)[2]) {
   const double wanted = in.options.number(option);
   if (wanted >= 0) return wanted;
-  constexpr size_t kLarge = 1 << 16;
-  return bestGamma(uncorrelatedScores(groups, in.unbiased->mean, in.unbiased->mean.size() > kLarge ? 4 : 1));
+  constexpr size_t kVotes = 1 << 15, kWindow = 15;
+  const size_t step = std::clamp<size_t>(in.unbiased->mean.size() / kVotes, 1, kWindow);
+  return bestGamma(uncorrelatedScores(groups, in.unbiased->mean, static_cast<int>(step)));
 }
 
 // The error of an image whose halves are independent and whose bias is negligible: (A - B)² / 4, averaged over channels

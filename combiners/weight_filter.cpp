@@ -6,6 +6,7 @@
 
 #include "combiners/denoise/window.h"
 #include "combiners/finite_float.h"
+#include "combiners/pair_rows.h"
 #include "renderer/core/error.h"
 
 namespace braid {
@@ -13,9 +14,13 @@ namespace braid {
 namespace {
 
 constexpr int kRadius = 7;
-constexpr int kBlock = 128;  // columns at a time
+constexpr int kTileWidth = 64, kTileHeight = 32;
+// Pairs at a time, past the end of a row as well: what is left over of vectors would take as long as they all.
+constexpr int kUnit = 8;
+static_assert(kRadius <= kUnit);
+constexpr float kRounding = 1e-5f;  // of sums of weights
 // Weights below 2^-80 are nothing, and their products would be subnormal numbers, which take hundreds of cycles.
-constexpr float kLowestExponent = -80;
+constexpr int kLowestExponent = -80;
 constexpr float kSpatial = 3.0f, kColour = 2.0f, kAlbedo = 0.25f, kNormal = 0.15f;
 
 constexpr float exponentScale(float sigma) { return kLog2E / (2 * sigma * sigma); }
@@ -66,7 +71,7 @@ void kernelOfRow(const Guides& guides, size_t p, size_t q, float spatial, int co
     float e = spatial + exponentScale(kColour) * (squaredDistance(colourP, colourQ, x) / (vp[x] + vq[x]));
     if (kHasAlbedo) e += exponentScale(kAlbedo) * squaredDistance(albedoP, albedoQ, x);
     if (kHasNormal) e += exponentScale(kNormal) * squaredDistance(normalP, normalQ, x);
-    out[x] = exp2NonPositive(std::max(-e, kLowestExponent));
+    out[x] = exp2NonPositive<kLowestExponent>(-e);
   }
 }
 
@@ -80,31 +85,82 @@ void kernelOfRow(const Guides& guides, size_t p, size_t q, float spatial, int co
                   : kernelOfRow<false, false>(guides, p, q, spatial, count, out);
 }
 
-// Filters columns [x0, x0 + count) of row y. `sums` has room for all maps.
-void filterBlock(const WeightMaps& raw, const Guides& guides, int step, int x0, int y, int count, float* sums,
-                 WeightMaps& out) {
-  const Plane<float>& shape = raw.planes[0];
-  float norm[kBlock] = {}, kernel[kBlock];
-  std::fill_n(sums, raw.planes.size() * kBlock, 0.0f);
-  const int radius = kRadius / step * step;
-  for (int dy = -std::min(radius, y / step * step); dy <= std::min(radius, shape.height - 1 - y); dy += step)
-    for (int dx = -radius; dx <= radius; dx += step) {
-      const int from = std::max(x0, -dx), to = std::min(x0 + count, shape.width - dx), n = to - from;
-      if (n <= 0) continue;
-      const size_t p = shape.index(from, y), q = shape.index(from + dx, y + dy);
-      const auto spatial = static_cast<float>(dx * dx + dy * dy) * exponentScale(kSpatial);
-      kernelOfRow(guides, p, q, spatial, n, kernel);
-      float* normAt = norm + (from - x0);
-      for (int x = 0; x < n; ++x) normAt[x] += kernel[x];
-      for (size_t m = 0; m < raw.planes.size(); ++m) {
-        float* __restrict sum = sums + m * kBlock + (from - x0);
-        const float* __restrict weight = raw.planes[m].data.data() + q;
-        for (int x = 0; x < n; ++x) sum[x] += kernel[x] * weight[x];
-      }
+// Filters one tile. The maps of the last base are what is left to 1.
+class TileFilter {
+ public:
+  TileFilter(const WeightMaps& raw, const Guides& guides, const PixelRect& tile)
+      : raw_(raw),
+        guides_(guides),
+        tile_(tile),
+        shape_(raw.planes[0]),
+        maps_(raw.planes.size() - raw.channels),
+        area_(static_cast<size_t>(tile.width()) * static_cast<size_t>(tile.height())),
+        norm_(area_, 1.0f),
+        sums_(maps_ * area_) {}
+
+  void filter(int step, WeightMaps& out) {
+    startWithCentres();
+    forPairRows(tile_, {0, 0, shape_.width, shape_.height}, kRadius, step, [&](const PairRow& row) { add(row); });
+    for (int y = tile_.y0; y < tile_.y1; ++y) write(y, out);
+  }
+
+ private:
+  // A pixel's own weights, of kappa = 1.
+  void startWithCentres() {
+    for (size_t m = 0; m < maps_; ++m)
+      for (int y = tile_.y0; y < tile_.y1; ++y)
+        std::copy_n(&raw_.planes[m].at(tile_.x0, y), tile_.width(), &sums_[m * area_ + at(tile_.x0, y)]);
+  }
+
+  void add(const PairRow& row) {
+    const Columns all = row.all();
+    const size_t p = shape_.index(all.begin, row.y), q = shape_.index(all.begin + row.dx, row.y + row.dy);
+    const auto spatial = static_cast<float>(row.dx * row.dx + row.dy * row.dy) * exponentScale(kSpatial);
+    const auto left = static_cast<int>(std::min<size_t>(shape_.size() - std::max(p, q), kTileWidth + 2 * kUnit));
+    float kernel[kTileWidth + 2 * kUnit];
+    kernelOfRow(guides_, p, q, spatial, std::min(roundUp(all.count(), kUnit), left), kernel);
+    const int first = row.first.begin - all.begin, second = row.second.begin - all.begin;
+    if (!row.first.empty())
+      addWeighted(kernel + first, row.first.count(), q + static_cast<size_t>(first), at(row.first.begin, row.y));
+    if (!row.second.empty())
+      addWeighted(kernel + second, row.second.count(), p + static_cast<size_t>(second),
+                  at(row.second.begin + row.dx, row.y + row.dy));
+  }
+
+  // Adds the weights from pixel `from` on to the sums from `to` on.
+  void addWeighted(const float* __restrict kernel, int count, size_t from, size_t to) {
+    float* __restrict norm = norm_.data() + to;
+    for (int k = 0; k < count; ++k) norm[k] += kernel[k];
+    for (size_t m = 0; m < maps_; ++m) {
+      float* __restrict sum = sums_.data() + m * area_ + to;
+      const float* __restrict weight = raw_.planes[m].data.data() + from;
+      for (int k = 0; k < count; ++k) sum[k] += kernel[k] * weight[k];
     }
-  for (size_t m = 0; m < raw.planes.size(); ++m)
-    for (int x = 0; x < count; ++x) out.planes[m].at(x0 + x, y) = sums[m * kBlock + static_cast<size_t>(x)] / norm[x];
-}
+  }
+
+  void write(int y, WeightMaps& out) const {
+    for (size_t c = 0; c < out.channels; ++c)
+      for (int x = tile_.x0; x < tile_.x1; ++x) {
+        float sum = 0;
+        for (size_t m = c; m < maps_; m += out.channels)
+          sum += out.planes[m].at(x, y) = sums_[m * area_ + at(x, y)] / norm_[at(x, y)];
+        const bool nothingLeft = std::fabs(1 - sum) < kRounding;
+        for (size_t m = c; nothingLeft && m < maps_; m += out.channels) out.planes[m].at(x, y) /= sum;
+        out.planes[maps_ + c].at(x, y) = nothingLeft ? 0 : 1 - sum;
+      }
+  }
+
+  size_t at(int x, int y) const {
+    return static_cast<size_t>(y - tile_.y0) * static_cast<size_t>(tile_.width()) + static_cast<size_t>(x - tile_.x0);
+  }
+
+  const WeightMaps& raw_;
+  const Guides& guides_;
+  const PixelRect tile_;
+  const Plane<float>& shape_;
+  const size_t maps_, area_;
+  std::vector<float> norm_, sums_;
+};
 
 }  // namespace
 
@@ -115,11 +171,9 @@ WeightMaps filteredWeights(const WeightMaps& raw, const Estimate& guide, const F
   if (features && !features->albedo.mean.empty()) guides.albedo = &features->albedo.mean;
   if (features && !features->normal.mean.empty()) guides.normal = &features->normal.mean;
   WeightMaps out = raw;
-  const int width = guide.mean.width();
-  parallelRows(guide.mean.height(), [&](int y) {
-    std::vector<float> sums(raw.planes.size() * kBlock);
-    for (int x0 = 0; x0 < width; x0 += kBlock)
-      runVectorised([&] { filterBlock(raw, guides, step, x0, y, std::min(kBlock, width - x0), sums.data(), out); });
+  forEachTile(guide.mean.width(), guide.mean.height(), kTileWidth, kTileHeight, [&](const PixelRect& tile) {
+    TileFilter filter(raw, guides, tile);
+    runVectorised([&] { filter.filter(step, out); });
   });
   return out;
 }

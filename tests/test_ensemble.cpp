@@ -256,17 +256,16 @@ TEST_CASE("Relative errors: the scale of a pixel, and no bright pixel decides fo
   CHECK(beside(0) > 0.28f);
 }
 
-TEST_CASE("The filter of weights is the formula at a pixel near a corner") {
+TEST_CASE("The filter of weights is the formula near corners and where tiles meet") {
   CaseOptions o;
-  o.width = 12;
-  o.height = 10;
+  o.width = 70;
+  o.height = 38;
   const Case c = makeCase(o);
   const MethodInputs in = inputsOf(c);
   const WeightMaps raw = ensembleWeights(*in.unbiased, in.bases, {.patchRadius = 0});
   const Estimate z = weightedEstimate(raw, in.bases);
   const WeightMaps maps = filteredWeights(raw, z, in.features);
-  const int px = 2, py = 1;
-  const size_t p = z.mean[0].index(px, py);
+  REQUIRE(maps.bases == 3);
   const auto spread = [&](size_t i) {
     double v = 0;
     for (size_t k = 0; k < 3; ++k)
@@ -274,22 +273,26 @@ TEST_CASE("The filter of weights is the formula at a pixel near a corner") {
            0.5e-6 * sqr(static_cast<double>(z.mean[k][i]));
     return v + 0.5e-10;
   };
-  double sum = 0, norm = 0;
-  for (int y = 0; y <= py + 7; ++y)
-    for (int x = 0; x <= px + 7; ++x) {
-      const size_t q = z.mean[0].index(x, y);
-      double dz = 0, da = 0, dn = 0;
-      for (size_t k = 0; k < 3; ++k) {
-        dz += sqr(static_cast<double>(z.mean[k][p] - z.mean[k][q]));
-        da += sqr(static_cast<double>(in.features->albedo.mean[k][p] - in.features->albedo.mean[k][q]));
-        dn += sqr(static_cast<double>(in.features->normal.mean[k][p] - in.features->normal.mean[k][q]));
+  for (const auto& [px, py] : {std::pair{2, 1}, {63, 31}, {64, 32}, {60, 35}, {69, 37}}) {
+    const size_t p = z.mean[0].index(px, py);
+    double sums[3] = {}, norm = 0;
+    for (int y = std::max(0, py - 7); y <= std::min(o.height - 1, py + 7); ++y)
+      for (int x = std::max(0, px - 7); x <= std::min(o.width - 1, px + 7); ++x) {
+        const size_t q = z.mean[0].index(x, y);
+        double dz = 0, da = 0, dn = 0;
+        for (size_t k = 0; k < 3; ++k) {
+          dz += sqr(static_cast<double>(z.mean[k][p] - z.mean[k][q]));
+          da += sqr(static_cast<double>(in.features->albedo.mean[k][p] - in.features->albedo.mean[k][q]));
+          dn += sqr(static_cast<double>(in.features->normal.mean[k][p] - in.features->normal.mean[k][q]));
+        }
+        const double e = ((x - px) * (x - px) + (y - py) * (y - py)) / 18.0 + dz / (spread(p) + spread(q)) / 8 +
+                         da / (2 * 0.25 * 0.25) + dn / (2 * 0.15 * 0.15);
+        for (size_t b = 0; b < 3; ++b) sums[b] += std::exp(-e) * static_cast<double>(raw.of(b, 2)[q]);
+        norm += std::exp(-e);
       }
-      const double e = ((x - px) * (x - px) + (y - py) * (y - py)) / 18.0 + dz / (spread(p) + spread(q)) / 8 +
-                       da / (2 * 0.25 * 0.25) + dn / (2 * 0.15 * 0.15);
-      sum += std::exp(-e) * static_cast<double>(raw.of(1, 2)[q]);
-      norm += std::exp(-e);
-    }
-  CHECK(static_cast<double>(maps.of(1, 2)[p]) == doctest::Approx(sum / norm).epsilon(1e-4));
+    for (size_t b = 0; b < 3; ++b)
+      CHECK(static_cast<double>(maps.of(b, 2)[p]) == doctest::Approx(sums[b] / norm).epsilon(1e-4));
+  }
 }
 
 TEST_CASE("An ensemble is no worse than its best base at 64 samples, better than the mean, and knows its error") {

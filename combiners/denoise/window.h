@@ -59,13 +59,14 @@ void forEachTile(int width, int height, int tileWidth, int tileHeight, const Bod
 
 inline constexpr float kLog2E = 1.44269504088896f;
 
-// 2^x for x <= 0; the relative error is below 5e-7, exact at 0. Arguments below -126, and NaN, give 2^-126: nothing in
-// practice, and never a subnormal. Adding and subtracting 1.5 * 2^23 rounds to the nearest integer and leaves it in the
-// low bits; the polynomial is the Taylor series of 2^f on [-1/2, 1/2] up to f^5, with f^6 replaced by the Chebyshev fit
-// of lower degree.
+// 2^x for x <= 0; the relative error is below 5e-7, exact at 0. Arguments below kLowest, and NaN, give 2^kLowest:
+// nothing in practice, and never a subnormal. Adding and subtracting 1.5 * 2^23 rounds to the nearest integer and
+// leaves it in the low bits; the polynomial is the Taylor series of 2^f on [-1/2, 1/2] up to f^5, with f^6 replaced by
+// the Chebyshev fit of lower degree.
+template <int kLowest = -126>
 inline float exp2NonPositive(float x) {
-  constexpr float kMagic = 12582912.0f;
-  x = x > -126.0f ? x : -126.0f;
+  constexpr float kMagic = 12582912.0f, kLeast = kLowest;
+  x = x > kLeast ? x : kLeast;
   const float shifted = x + kMagic;
   const float f = x - (shifted - kMagic);
   float p = 0.00967589f + f * 0.00133335581f;
