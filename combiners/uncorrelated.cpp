@@ -87,8 +87,7 @@ MethodResult Uncorrelated::run(const MethodInputs& in) const {
   const size_t swap = z.correlation == Correlation::Gradients ? 1 : 0;
   NoiseChoice noise;
   noise.most = std::clamp(in.options.number(kMostNoise), 0.0, 1e30);
-  Rgb<float> levels;
-  if (!y.variance.empty()) levels = noiseLevels(y.mean, y.variance);
+  const Rgb<float> levels = differenceNoiseLevels(y, z);
   if (noise.most > 0 && !levels.empty()) noise.levels = &levels;
   const UncorrelatedInputs groups[2] = {uncorrelatedGroup(y, z, 0, swap, swap, noise),
                                         uncorrelatedGroup(y, z, 1, 1 - swap, 1 - swap, noise)};

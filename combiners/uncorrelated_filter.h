@@ -35,7 +35,8 @@ struct UncorrelatedInputs {
   const Rgb<float>*independent = nullptr, *correlated = nullptr;  // y and z
   const Rgb<float>*first = nullptr, *second = nullptr;            // of z
   double samples = 1;
-  // noiseLevels() of y, or null; and the most that one pixel of a pair may have, in units of the other's.
+  // differenceNoiseLevels() of y and z, or null; and the most that one pixel of a pair may have, in units of the
+  // other's.
   const Rgb<float>* noise = nullptr;
   double mostNoise = 0;
 };

@@ -2,8 +2,10 @@
 #include "combiners/uncorrelated_noise.h"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
+#include "combiners/finite_float.h"
 #include "combiners/shrinkage.h"
 #include "renderer/core/parallel.h"
 #include "renderer/film/box_sum.h"
@@ -12,9 +14,10 @@ namespace braid {
 
 namespace {
 
-// The square of a mean in units of its variance from which on it is that of several strong samples, not of one to
-// three.
-constexpr double kEstablished = 4;
+// The square of a mean in units of its variance from which on it is that of several strong samples: k equal ones of
+// many make k, and three are enough. With four, the glint of a lamp that one image had met three times was shared out
+// among thousands of dark pixels: plates at 32 samples had 1.25 times the error, over 60 seeds.
+constexpr double kEstablished = 2.9;
 // Neighbours of the eight that have to be as uncertain, within the factor, for a strong sample to be no outlier.
 constexpr int kFellows = 3;
 constexpr float kFellowFactor = 16;
@@ -89,6 +92,20 @@ Rgb<float> noiseLevels(const Rgb<float>& mean, const Rgb<float>& variance) {
         out[c][i] = isEstablished(mean[c], variance[c], x, y) ? std::max(variance[c][i], around[i]) : around[i];
       }
     });
+  }
+  return out;
+}
+
+Rgb<float> differenceNoiseLevels(const Estimate& y, const Estimate& z) {
+  Rgb<float> out;
+  for (const Estimate* image : {&y, &z}) {
+    if (image->variance.empty()) continue;
+    Rgb<float> levels = noiseLevels(image->mean, image->variance);
+    for (size_t c = 0; c < 3 && !out.empty(); ++c)
+      parallelChunks(levels.size(), kPixelChunk, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end; ++i) levels[c][i] = finiteFloat(levels[c][i] + out[c][i]);
+      });
+    out = std::move(levels);
   }
   return out;
 }

@@ -33,7 +33,7 @@ PlainMean plainMean(const Estimate& y, const Estimate& z);
 // argument of the paper for its weights. A rare strong sample is not lost: where its neighbours have taken their parts
 // of it, it is in the window of all of them, for that is as wide as the filter's.
 //
-// u is one over squareUnits() of y, z and `noise`, noiseLevels() or empty, with levels of pixels alike in noise.
+// u is one over squareUnits() of y, z and `noise`, differenceNoiseLevels() or empty, with levels of pixels alike in noise.
 std::array<Plane<float>, 3> combinedShares(const PlainMean& mean, const Rgb<float> (&combined)[2],
                                            const Rgb<float>& noise);
 

@@ -278,6 +278,29 @@ TEST_CASE("Strong samples of neighbours are a lamp: theirs is the noise of the p
   }
 }
 
+TEST_CASE("A lamp that only the correlated image has met does not darken its surroundings") {
+  constexpr int kSize = 31, kLamp = 15;
+  const Rgb<float> nothing(kSize, kSize, 0.0f);
+  Estimate y;
+  y.mean = Rgb<float>(kSize, kSize, 0.1f);
+  y.variance = Rgb<float>(kSize, kSize, 1e-4f);
+  Estimate z = y;
+  for (size_t c = 0; c < 3; ++c) z.mean[c].at(kLamp, kLamp) += 5, z.variance[c].at(kLamp, kLamp) = 1;
+  const auto filtered = [&](const Rgb<float>& levels) {
+    return uncorrelatedFiltered({&y.mean, &z.mean, &nothing, &nothing, 16, &levels, 30}, 0.5);
+  };
+  const Rgb<float> ofOne = filtered(noiseLevels(y.mean, y.variance)), ofBoth = filtered(differenceNoiseLevels(y, z));
+  for (size_t c = 0; c < 3; ++c) {
+    CHECK(ofOne[c].at(kLamp + 3, kLamp) < 0.1f - 0.02f);
+    CHECK(ofBoth[c].at(kLamp + 3, kLamp) == doctest::Approx(0.1));
+    CHECK(ofBoth[c].at(kLamp, kLamp) == doctest::Approx(0.1));
+  }
+  Estimate unknown = z;
+  unknown.variance = Rgb<float>();
+  CHECK(identical(differenceNoiseLevels(y, unknown), noiseLevels(y.mean, y.variance)));
+  CHECK(differenceNoiseLevels(unknown, unknown).empty());
+}
+
 TEST_CASE("Lone strong samples that the other image knows nothing of are shared out, and no light is lost") {
   for (const auto& [width, height] : {std::array{90, 70}, {7, 3}}) {
     CAPTURE(width);
@@ -323,15 +346,15 @@ TEST_CASE("What several samples make, or neighbours, is no lone sample") {
   y.variance = Rgb<float>(40, 40, 1e-4f);
   const Rgb<float> z = y.mean;
   y.mean[0].at(20, 20) = 50;
-  y.variance[0].at(20, 20) = 625;  // a mean of twice its deviation
+  y.variance[0].at(20, 20) = 833;  // of three equal samples of many
   CHECK_FALSE(withoutLoneSamples(y, z));
-  y.variance[0].at(20, 20) = 700;
+  y.variance[0].at(20, 20) = 1250;  // of two
   CHECK(withoutLoneSamples(y, z));
   // Three neighbours with a sixteenth of its variance, themselves of means that count.
   for (const auto& [u, v] : {std::pair{19, 20}, {21, 20}, {20, 21}}) {
     CHECK(withoutLoneSamples(y, z));
     y.mean[0].at(u, v) = 20;
-    y.variance[0].at(u, v) = 50;
+    y.variance[0].at(u, v) = 80;
   }
   CHECK_FALSE(withoutLoneSamples(y, z));
 }
@@ -344,7 +367,7 @@ TEST_CASE("Images from gradients are crossed: their halves meet the other halves
   in.options.set("uncorrelated-measured", 0);
   const MethodResult r = make_uncorrelated()->run(in);
   const Estimate &y = c.pt(), &z = c.crn();
-  const Rgb<float> levels = noiseLevels(y.mean, y.variance);
+  const Rgb<float> levels = differenceNoiseLevels(y, z);
   const Rgb<float> a =
       uncorrelatedFiltered({&y.half[0], &z.half[1], &z.quarter[1], &z.quarter[3], 8, &levels, 224}, 0.2);
   const Rgb<float> b =
