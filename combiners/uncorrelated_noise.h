@@ -17,8 +17,8 @@ Rgb<float> noiseLevels(const Rgb<float>& mean, const Rgb<float>& variance);
 
 // The sum of those of two images, each of which counts as 0 where it has no variance: what the pixels of their
 // difference are uncertain by. By the noise of the independent image alone, a glint that only the correlated image had
-// met, seven times, took the pixels around it to 20 times their light below black: in one of 100 renders of plates at 32
-// samples, whose error over all 100 was 1.05 times that of pt.
+// met, seven times, took the pixels around it to 20 times their light below black: in one of 100 renders of plates at
+// 32 samples, whose error over all 100 was 1.05 times that of pt.
 Rgb<float> differenceNoiseLevels(const Estimate& y, const Estimate& z);
 
 // An image without its lone strong samples, and what they come to in every pixel.
@@ -37,7 +37,7 @@ struct SharedOut {
 // a 3969th does little in either. Over 100 small renders of each scene at 32 samples, the error of uncorrelated
 // weighting is 0.63 times that of the better input on plates, instead of 2.1; 0.055 instead of 0.085 on sun_sky, 0.2
 // instead of 0.23 on materials, 0.023 instead of 0.03 on torus_glass, and 0.01 instead of 0.02 and 0.03 on pool and
-// glass of water. The price is squared bias where caustics are found rarely: on pool 0.063 instead of 0.024, where the
+// glass of water. The price is squared bias where caustics are found rarely: on pool 0.055 instead of 0.024, where the
 // error of the better input is 32.
 std::optional<SharedOut> withoutLoneSamples(const Estimate& image, const Rgb<float>& other);
 
