@@ -44,9 +44,8 @@ class Padded {
  public:
   Padded(const UncorrelatedInputs& in, size_t c)
       : width_(in.first->width()), height_(in.first->height()), rows_(packed(in, c)) {}
-  // The image, and with the pixels around it.
-  PixelRect image() const { return {0, 0, width_, height_}; }
-  PixelRect around() const { return grown(image(), kRadius); }
+  // The image with the pixels around it.
+  PixelRect around() const { return grown({0, 0, width_, height_}, kRadius); }
   Pixels at(int x, int y) const {
     const float* h = rows_.row(0, y + kRadius) + x + kRadius;
     return {h, h + rows_.pitch(), h + 2 * rows_.pitch()};

@@ -31,8 +31,8 @@ inline UncorrelatedInputs uncorrelatedGroup(const Estimate& y, const Estimate& z
           noise.most};
 }
 
-// The option when it is set, or else the best gamma for these groups. 2^15 pixels vote, in rows so near to each other
-// that their windows cover the image.
+// The option when it is set, or else the best gamma for these groups. 2^15 pixels vote, or as many more as it takes for
+// the windows of their rows to cover the image.
 inline double chosenGamma(const MethodInputs& in, const OptionInfo& option, const UncorrelatedInputs (&groups)[2]) {
   const double wanted = in.options.number(option);
   if (wanted >= 0) return wanted;
