@@ -78,7 +78,7 @@ TEST_CASE("Stored weights are those of non-local means at every centre, to 16 bi
       CAPTURE(width);
       CAPTURE(stride);
       const NlmWindowStore store(std::span(&guide, 1), 4, stride);
-      NlmWeights weights(std::span(&guide, 1), all), halfWeights(std::span(&half, 1), all);
+      NlmWeights weights(std::span(&guide, 1), 4, all), halfWeights(std::span(&half, 1), 4, all);
       double worst = 0, worstHalf = 0;
       for (int dy = -4; dy <= 4; ++dy)
         for (int dx = -4; dx <= 4; ++dx) {

@@ -34,10 +34,8 @@ double plainWeight(std::span<const NlmGuide> guides, int x, int y, int u, int v)
           };
           const double scale = static_cast<double>(g.varianceScale);
           const double vp = scale * value(*g.variance[c], x, y), vq = scale * value(*g.variance[c], u, v);
-          const Plane<float>& spread = g.spread.empty() ? *g.variance[c] : *g.spread[c];
-          const double sp = scale * value(spread, x, y), sq = scale * value(spread, u, v);
           const double d2 = sqr(value(*g.mean[c], x, y) - value(*g.mean[c], u, v)) - (vp + std::min(vp, vq));
-          sum += std::min(1e4, d2 / (sqr(static_cast<double>(g.k)) * (sp + sq) + static_cast<double>(g.epsilon)));
+          sum += std::min(1e4, d2 / (sqr(static_cast<double>(g.k)) * (vp + vq) + static_cast<double>(g.epsilon)));
           ++count;
         }
       }
@@ -47,7 +45,7 @@ double plainWeight(std::span<const NlmGuide> guides, int x, int y, int u, int v)
 }
 
 double worstWeight(std::span<const NlmGuide> guides, const PixelRect& tile) {
-  NlmWeights weights(guides, tile);
+  NlmWeights weights(guides, 5, tile);
   const int width = guides[0].mean[0]->width, height = guides[0].mean[0]->height;
   double worst = 0;
   for (int dy = -4; dy <= 4; dy += 2)
@@ -84,20 +82,18 @@ TEST_CASE("The weights of non-local means are what their formula says, for any p
   }
 }
 
-TEST_CASE("Of several guides the largest distance counts, with their own spread, scale and patch") {
+TEST_CASE("Of several guides the largest distance counts, with their own scale and patch") {
   const Case c = caseOf(40, 30, 16);
   const Estimate& e = c.pt();
   const FeaturePlanes<Plane<float>>& depth = c.estimates.features->depth;
-  const Plane<float> spread(40, 30, 0.01f);
   NlmGuide red = nlmGuide(e.mean[0], e.variance[0], 0.5f, 3), feature = nlmGuide(depth.mean, depth.variance, 0.6f, 0);
   red.varianceScale = 2;
-  feature.spread = {&spread};
   feature.epsilon = 1e-10f;
   const std::array guides = {red, feature};
   CHECK(worstWeight(guides, {3, 5, 38, 30}) < 1e-4);
   // Both matter somewhere.
   const PixelRect all = {0, 0, 40, 30};
-  NlmWeights both(guides, all), one({&guides[0], 1}, all), other({&guides[1], 1}, all);
+  NlmWeights both(guides, 3, all), one({&guides[0], 1}, 3, all), other({&guides[1], 1}, 3, all);
   const float *w = both.at(3, 1), *a = one.at(3, 1), *b = other.at(3, 1);
   int first = 0, second = 0;
   for (size_t i = 0; i < 1200; ++i) {
@@ -133,7 +129,7 @@ TEST_CASE("The filter is the weighted mean over the window, for several targets 
 TEST_CASE("A pixel has weight one with itself, also without variance") {
   const Rgb<float> image(9, 5, 3.0f), none(9, 5);
   const NlmGuide guide = nlmGuide(image, none, 0.45f, 3);
-  NlmWeights weights(std::span(&guide, 1), {0, 0, 9, 5});
+  NlmWeights weights(std::span(&guide, 1), 0, {0, 0, 9, 5});
   const float* w = weights.at(0, 0);
   for (int i = 0; i < 45; ++i) CHECK(w[i] == 1.0f);
 }

@@ -36,7 +36,7 @@ class NonLocalMeans : public Method {
     needs.halves = needs.variance = false;
     return needs;
   }
-  MethodMemory memory(const MemoryCase& /*of*/) const override { return {64, 36}; }
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {60, 36, 900'000}; }
   std::vector<OptionInfo> options() const override { return {kSensitivity, kWindow, kPatch}; }
 
   MethodResult run(const MethodInputs& in) const override {

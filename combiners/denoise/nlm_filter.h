@@ -3,11 +3,11 @@
 // Filtering"), in gather form: a building block of the denoisers.
 //
 // The distance of a pixel pair p, q in one channel of a guide image u with variance v is
-//   d² = ((u_p - u_q)² - (v_p + min(v_p, v_q))) / (k² (s_p + s_q) + eps),   at most 10⁴,
-// with s = v unless the guide says otherwise. It is averaged over the channels of the guide and over a patch of
-// (2F + 1)² pixel pairs at the same offset, clipped at the borders; the weight is exp(-max(0, distance)). With several
-// guides the largest distance counts, that is the smallest weight: three guides of one channel each give the minimum
-// over red, green and blue. The weight of a pixel with itself is 1.
+//   d² = ((u_p - u_q)² - (v_p + min(v_p, v_q))) / (k² (v_p + v_q) + eps),   at most 10⁴.
+// It is averaged over the channels of the guide and over a patch of (2F + 1)² pixel pairs at the same offset, clipped
+// at the borders; the weight is exp(-max(0, distance)). With several guides the largest distance counts, that is the
+// smallest weight: three guides of one channel each give the minimum over red, green and blue. The weight of a pixel
+// with itself is 1.
 #pragma once
 
 #include <array>
@@ -23,10 +23,9 @@ namespace braid {
 // Planes that weights are computed from, and how. All planes are finite, of one size, and outlive the filter.
 struct NlmGuide {
   std::vector<const Plane<float>*> mean, variance;  // one of each per channel; variances of the mean, >= 0
-  std::vector<const Plane<float>*> spread;          // s of the denominator; empty: the variances
   float k = 0.45f;                                  // sensitivity: larger filters more
   int patch = 3;                                    // F >= 0
-  float varianceScale = 1;                          // factor on variance and spread, e.g. 2 for half buffers
+  float varianceScale = 1;                          // factor on the variances, e.g. 2 for half buffers
   float epsilon = 1e-7f;
 };
 
@@ -38,22 +37,36 @@ NlmGuide nlmGuide(const Rgb<float>& mean, const Rgb<float>& variance, float k, i
 // object per tile and thread.
 class NlmWeights {
  public:
-  // `tile` lies in the image. There is at least one guide, with at least one channel.
-  NlmWeights(std::span<const NlmGuide> guides, const PixelRect& tile);
+  // `tile` lies in the image; `window`: the largest offset in x or y. There is at least one guide, with at least one
+  // channel.
+  NlmWeights(std::span<const NlmGuide> guides, int window, const PixelRect& tile);
 
   // The weights of (p, p + (dx, dy)) for the pixels p of the tile, row by row, tile.width() apart; 0 where p + (dx, dy)
   // lies outside the image. Valid until TileSums::kAtOnce further calls.
   const float* at(int dx, int dy);
 
  private:
-  void addGuide(const NlmGuide& guide, int dx, int dy, const PixelRect& inside, bool first, float* weights);
+  struct Guide {
+    Guide(const NlmGuide& guide, const PixelRect& around);
+    const float* at(int x, int y) const;
+    // The distances of `count` pairs from (x0, y) on times k², summed over the channels.
+    void distances(int dx, int dy, int y, int x0, int count, float* out) const;
 
-  std::span<const NlmGuide> guides_;
+    PixelRect area;
+    int channels, patch;
+    float squareK, epsilon;
+    size_t pitch;
+    std::vector<float> data;
+  };
+  void clearOutside(const PixelRect& inside, float* weights) const;
+  void addGuide(const Guide& guide, int dx, int dy, const PixelRect& inside, float* weights);
+
+  std::vector<Guide> guides_;
   PixelRect tile_;
   int width_, height_;                                         // of the image
   std::array<std::vector<float>, TileSums::kAtOnce> weights_;  // taken in turn
   size_t next_ = 0;
-  std::vector<float> difference_, rowSums_, inverseCounts_, patchSums_;
+  std::vector<float> difference_, rowSums_, columnScales_, patchSums_, unused_;
 };
 
 // Replaces each pixel of each target by its weighted mean over the window of (2 window + 1)² pixels, clipped at the

@@ -29,7 +29,7 @@ NlmWindowStore::NlmWindowStore(std::span<const NlmGuide> guides, int radius, int
 
 void NlmWindowStore::fillTile(std::span<const NlmGuide> guides, const PixelRect& tile, const Rgb<float>* image,
                               std::array<Rgb<float>, 2>* zeroOrder) {
-  NlmWeights weights(guides, tile);
+  NlmWeights weights(guides, radius_, tile);
   std::optional<TileSums> sums;
   if (zeroOrder) {
     const std::array<const Plane<float>*, 3> in = {&(*image)[0], &(*image)[1], &(*image)[2]};
