@@ -76,7 +76,9 @@ void addShared(Rgb<float>& combined, const Rgb<float>* ofY, const Rgb<float>* of
   Rgb<float> light = *ofY;
   if (!share[0].empty()) takeShare(light, mean, *ofY, ofZ ? *ofZ : nothing, share);
   for (size_t c = 0; c < 3; ++c)
-    for (size_t i = 0; i < combined.size(); ++i) combined[c][i] = finiteFloat(combined[c][i] + light[c][i]);
+    parallelChunks(combined.size(), kPixelChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) combined[c][i] = finiteFloat(combined[c][i] + light[c][i]);
+    });
 }
 
 MethodResult Uncorrelated::run(const MethodInputs& in) const {

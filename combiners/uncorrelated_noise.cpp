@@ -46,12 +46,15 @@ struct Pixel {
 
 std::vector<Pixel> lonePixels(const Plane<float>& mean, const Plane<float>& variance, const Plane<float>& around,
                               const Plane<float>& other) {
-  std::vector<Pixel> lone;
-  for (int y = 0; y < mean.height; ++y)
+  std::vector<std::vector<Pixel>> ofRow(static_cast<size_t>(mean.height));
+  parallelRows(mean.height, [&](int y) {
     for (int x = 0; x < mean.width; ++x)
       if (variance.at(x, y) > kStrong * around.at(x, y) && other.at(x, y) < kKnown * mean.at(x, y) &&
           !isEstablished(mean, variance, x, y))
-        lone.push_back({x, y});
+        ofRow[static_cast<size_t>(y)].push_back({x, y});
+  });
+  std::vector<Pixel> lone;
+  for (const std::vector<Pixel>& row : ofRow) lone.insert(lone.end(), row.begin(), row.end());
   return lone;
 }
 
