@@ -134,6 +134,20 @@ TEST_CASE("A pixel has weight one with itself, also without variance") {
   for (int i = 0; i < 45; ++i) CHECK(w[i] == 1.0f);
 }
 
+TEST_CASE("Values at the end of the range have finite weights, and a pixel has weight one with itself") {
+  Rgb<float> image(9, 5, 3e38f);
+  image[0].at(4, 2) = image[1].at(6, 3) = -3e38f;
+  const Rgb<float> variance(9, 5, 3e38f);
+  NlmGuide guide = nlmGuide(image, variance, 100.0f, 3);
+  guide.varianceScale = 2;
+  NlmWeights weights(std::span(&guide, 1), 2, {0, 0, 9, 5});
+  const float *own = weights.at(0, 0), *other = weights.at(2, 1);
+  for (int i = 0; i < 45; ++i) {
+    CHECK(own[i] == 1.0f);
+    CHECK(std::isfinite(other[i]));
+  }
+}
+
 TEST_CASE("Without variance non-local means returns its input") {
   const Case c = caseOf(64, 48, 8);
   const Rgb<float> none(64, 48);

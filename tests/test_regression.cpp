@@ -231,6 +231,19 @@ TEST_CASE("The engine is the plain weighted regression, for strides, borders, sc
       }
 }
 
+TEST_CASE("The engine is the plain weighted regression for 1, 4, 5 and 6 unknowns, multiplied in blocks of three") {
+  const Scene scene(40, 7);
+  RegressionSettings s;
+  s.radius = 12;
+  s.stride = 2;
+  for (const size_t groups : {0u, 1u, 2u, 3u}) {
+    RegressionInputs in = scene.inputs();
+    in.features.resize(groups);
+    CAPTURE(groups);
+    CHECK(largestDifference(regress(in, s), Oracle{in, s, 40, 7}.run()) < 1e-4);
+  }
+}
+
 TEST_CASE("Two images fitted together get the bits of each by itself") {
   const Scene scene(37, 29);
   RegressionInputs in = scene.inputs(), swapped = in;
