@@ -149,9 +149,10 @@ struct PriorInput {
 };
 
 // The prior of all samples and those of the halves, each by a fit of its own. `first` is the first shrinkage: what the
-// prior falls back to. The halves only tell how good the prior is: with models twice as far apart they do so as well
-// (errors are 1.000 of those with as many models for all towards pw, over 8 scenes at 16, 64 and 256 samples, and 1.002
-// towards photon maps, over 6 scenes at 8, 32 and 128) in half the time for all three.
+// prior falls back to. Those of the halves go into the halves of the result and tell how good the prior is, no pixel of
+// the mean is theirs: with models twice as far apart they do as well (errors are 1.000 of those with as many models for
+// all towards pw, over 8 scenes at 16, 64 and 256 samples, and 1.002 towards photon maps, over 6 scenes at 8, 32 and
+// 128) in half the time for all three.
 Estimate ownFits(const MethodInputs& in, const PriorInput& of, const Estimate& first, int stride,
                  RegressionReport& report) {
   const Estimate &x = *of.x, &y = *in.biased;

@@ -157,7 +157,7 @@ NlmWeights::Guide::Guide(const NlmGuide& guide, const PixelRect& around)
       squareK(guide.k * guide.k),
       epsilon(guide.epsilon),
       pitch(static_cast<size_t>(roundUp(around.width(), kUnit))) {
-  if (pitch % 1024 == 0) pitch += 16;  // rows 4 KiB apart would share one set of the cache
+  if (pitch % 1024 == 0) pitch += kUnit;  // rows 4 KiB apart would share one set of the cache
   data.resize(2 * guide.mean.size() * pitch * static_cast<size_t>(area.height()) + kUnit);
   float* out = data.data();
   for (int y = area.y0; y < area.y1; ++y)
