@@ -14,8 +14,9 @@
 #include "combiners/pipeline.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_auto {
+
+using namespace test;
 
 namespace {
 
@@ -418,3 +419,5 @@ TEST_CASE("auto takes a consistent estimate in the place of an unbiased one, as 
             one.result.error[i] == other.result.error[i];
   CHECK(same);
 }
+
+}  // namespace braid::test_auto

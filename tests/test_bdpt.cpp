@@ -10,8 +10,9 @@
 #include "renderer/scene/gltf.h"
 #include "tests/calibration.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_bdpt {
+
+using namespace test;
 
 namespace {
 
@@ -207,3 +208,5 @@ TEST_CASE("bdpt copes with tiny lights, hidden lights and a camera inside of gla
   addMesh(glass, std::move(ball), static_cast<uint32_t>(glass.materials.size() - 1));
   checkAgreement("camera inside of glass", Scene(std::move(glass)), bdptSettings(32, 32, 256), 1024);
 }
+
+}  // namespace braid::test_bdpt

@@ -9,8 +9,9 @@
 #include "tests/bsdf_cases.h"
 #include "tests/chi_squared.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_bsdf {
+
+using namespace test;
 
 namespace {
 
@@ -319,3 +320,5 @@ TEST_CASE("bsdf: white furnace of a white dielectric loses only what single scat
     }
   }
 }
+
+}  // namespace braid::test_bsdf

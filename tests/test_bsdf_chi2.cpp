@@ -7,8 +7,9 @@
 #include "tests/bsdf_cases.h"
 #include "tests/chi_squared.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_bsdf_chi2 {
+
+using namespace test;
 
 TEST_CASE("bsdf: samples follow their density") {
   const auto cases = bsdfCases();
@@ -32,3 +33,5 @@ TEST_CASE("bsdf: samples follow their density") {
     }
   }
 }
+
+}  // namespace braid::test_bsdf_chi2

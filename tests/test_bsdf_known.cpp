@@ -8,8 +8,9 @@
 #include "tests/bsdf_cases.h"
 #include "tests/chi_squared.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_bsdf_known {
+
+using namespace test;
 
 namespace {
 
@@ -160,3 +161,5 @@ TEST_CASE("fresnel: a thin film") {
     CHECK(maxComponent(r) <= 1);
   }
 }
+
+}  // namespace braid::test_bsdf_known

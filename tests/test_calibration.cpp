@@ -4,8 +4,9 @@
 #include "renderer/scene/gltf.h"
 #include "tests/calibration.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_calibration {
+
+using namespace test;
 
 namespace {
 
@@ -62,3 +63,5 @@ TEST_CASE("calibration: reported variance is true on plates") {
 TEST_CASE("calibration: reported variance is true on an interior") {
   checkScene("interior", Scene(loadGltf(sourcePath("scenes/interior.glb"))), 24, 16, 64);
 }
+
+}  // namespace braid::test_calibration

@@ -16,7 +16,8 @@
 #include "tests/command_line.h"
 #include "tests/gltf_fixture.h"
 
-using namespace braid;
+namespace braid::test_cli {
+
 using test::braidRun;
 using test::Folder;
 using test::Json;
@@ -355,3 +356,5 @@ TEST_CASE("Reproducible renders are equal byte for byte") {
   REQUIRE(braidRun(folder, renderCommand("--size 40x30 --seed 9 -o c.exr")).code == 0);
   CHECK(braidRun(folder, "compare a.exr c.exr --metric relMSE --max 0").code == 6);
 }
+
+}  // namespace braid::test_cli

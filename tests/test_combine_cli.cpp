@@ -18,7 +18,8 @@
 #include "tests/render_fixture.h"
 #include "tools/estimates_file.h"
 
-using namespace braid;
+namespace braid::test_combine_cli {
+
 using test::braidRun;
 using test::Folder;
 using test::identical;
@@ -380,3 +381,5 @@ TEST_CASE("bench tells what denoisers and combiners cost, inputs first") {
   }
   CHECK(methods[0]["method"] == "pw");
 }
+
+}  // namespace braid::test_combine_cli

@@ -23,8 +23,9 @@
 #include "tests/gltf_fixture.h"
 #include "tools/estimates_file.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_combiner_contract {
+
+using namespace test;
 namespace fs = std::filesystem;
 
 namespace {
@@ -217,3 +218,5 @@ TEST_CASE("From files every method makes what it makes in process") {
     CHECK(sameBits(a.result, b.result));
   }
 }
+
+}  // namespace braid::test_combiner_contract

@@ -9,8 +9,9 @@
 #include "renderer/core/error.h"
 #include "tests/every_method.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_combiner_stability {
+
+using namespace test;
 
 namespace {
 
@@ -131,3 +132,5 @@ TEST_CASE("A constant image without noise is invariant") {
     CHECK(relativeDistance(outputOf(*m, everything(c)).result.image.mean, c.truth) < 1e-4);
   }
 }
+
+}  // namespace braid::test_combiner_stability

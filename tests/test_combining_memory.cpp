@@ -9,8 +9,9 @@
 #include "tests/combiner_fixture.h"
 #include "tests/counted_memory.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_combining_memory {
+
+using namespace test;
 
 namespace {
 
@@ -137,3 +138,5 @@ TEST_CASE("estimates take the memory that follows from their facts") {
   const Estimates copy = c.estimates;
   CHECK(perPixel(heapBytes() - before) == doctest::Approx(estimatesMemory(factsOf(copy))).epsilon(0.02));
 }
+
+}  // namespace braid::test_combining_memory

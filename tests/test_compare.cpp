@@ -19,7 +19,7 @@
 #include "tools/compare.h"
 #include "tools/metrics/metrics.h"
 
-using namespace braid;
+namespace braid::test_compare {
 
 namespace {
 
@@ -139,3 +139,5 @@ TEST_CASE("compare: the command line") {
   CHECK(captured.str().find("\"passed\": false") != std::string::npos);
   CHECK(app.get_subcommand("compare")->help().find("SMAPE") != std::string::npos);
 }
+
+}  // namespace braid::test_compare

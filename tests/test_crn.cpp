@@ -8,8 +8,9 @@
 #include "renderer/scene/gltf.h"
 #include "tests/pass_means.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_crn {
+
+using namespace test;
 
 namespace {
 
@@ -159,3 +160,5 @@ TEST_CASE("crn: differences of neighbours have far less noise than the path trac
   MESSAGE("squared noise of differences, crn over pt: ", noise[0] / noise[1]);
   CHECK(noise[0] < 0.5 * noise[1]);
 }
+
+}  // namespace braid::test_crn

@@ -12,8 +12,9 @@
 #include "combiners/sure_map.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_curve_risk {
+
+using namespace test;
 
 namespace {
 
@@ -147,3 +148,5 @@ TEST_CASE("Noise that both images share does not count against the denoised one"
   CHECK(meanShare(with, 0, 80) > 0.9);
   CHECK(meanSquaredError(with.image.mean, k.c.truth) < 0.95 * meanSquaredError(without.image.mean, k.c.truth));
 }
+
+}  // namespace braid::test_curve_risk

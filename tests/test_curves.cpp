@@ -16,8 +16,9 @@
 #include "renderer/core/error.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_curves {
+
+using namespace test;
 
 namespace {
 
@@ -305,3 +306,5 @@ TEST_CASE("A lone outlier is replaced by the denoised image, unless it contradic
   for (size_t ch = 0; ch < 3; ++ch) n.variance[ch].at(x, y) = 10 * 10;  // five deviations: not chance
   CHECK(run(in).image.mean[0].at(x, y) > denoised + 0.1f);
 }
+
+}  // namespace braid::test_curves

@@ -17,7 +17,8 @@
 #include "tests/render_fixture.h"
 #include "tools/estimates_file.h"
 
-using namespace braid;
+namespace braid::test_curves_stop {
+
 using test::CaseOptions;
 using test::Folder;
 using test::identical;
@@ -385,3 +386,5 @@ TEST_CASE("On the command line: combined later from the file, the stopped image 
   const std::string lost = must("combine --float --unbiased never.exr --method curves:8@box -o a.exr");
   CHECK(lost.find("that of pt after 8 passes was not kept") != std::string::npos);
 }
+
+}  // namespace braid::test_curves_stop

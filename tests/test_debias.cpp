@@ -12,8 +12,9 @@
 #include "renderer/scene/gltf.h"
 #include "tests/render_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_debias {
+
+using namespace test;
 
 namespace {
 
@@ -165,3 +166,5 @@ TEST_CASE("Under a caustic the error falls, and is told") {
   CHECK(told > 0.5 * after);
   CHECK(told < 2 * after);
 }
+
+}  // namespace braid::test_debias

@@ -17,8 +17,9 @@
 #include "combiners/registry.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_double_shrinkage {
+
+using namespace test;
 
 namespace {
 
@@ -475,3 +476,5 @@ TEST_CASE("Lone outliers of the unbiased image neither stay nor take their surro
   CHECK(alone < 1.2 * clean);
   CHECK(paper > 1.5 * alone);
 }
+
+}  // namespace braid::test_double_shrinkage

@@ -12,8 +12,9 @@
 #include "combiners/weight_filter.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_ensemble {
+
+using namespace test;
 
 namespace {
 
@@ -351,3 +352,5 @@ TEST_CASE("Options: unfiltered, shared, signed weights and full errors run, and 
   REQUIRE(r.remarks.size() == 1);
   CHECK(r.remarks[0].name == "weights");
 }
+
+}  // namespace braid::test_ensemble

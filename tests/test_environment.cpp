@@ -7,7 +7,8 @@
 #include "renderer/scene/environment.h"
 #include "tests/counts.h"
 
-using namespace braid;
+namespace braid::test_environment {
+
 using test::Rng;
 
 namespace {
@@ -144,3 +145,5 @@ TEST_CASE("A sun of one texel takes almost all samples and its neighbourhood kee
   // ∫ L over the sphere. Bilinear interpolation within texels of constant density: a standard deviation of about 1.
   CHECK(mean == doctest::Approx(static_cast<double>(4 * kPi * average(environment.average()))).epsilon(0.05));
 }
+
+}  // namespace braid::test_environment

@@ -20,7 +20,8 @@
 #include "renderer/film/exr.h"
 #include "renderer/film/srgb.h"
 
-using namespace braid;
+namespace braid::test_exr {
+
 namespace fs = std::filesystem;
 
 namespace {
@@ -397,3 +398,5 @@ TEST_CASE("bad files are refused in one line that names them") {
   CHECK(errorOf([&] { readImage(folder.file("huge.pfm")); }, ExitCode::BadInput) ==
         folder.file("huge.pfm") + ": 60000x60000 pixels are more than the limit of 2^28; crop or resize it");
 }
+
+}  // namespace braid::test_exr

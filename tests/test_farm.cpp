@@ -10,7 +10,8 @@
 #include "tests/command_line.h"
 #include "tools/farm_job.h"
 
-using namespace braid;
+namespace braid::test_farm {
+
 using test::braidRun;
 using test::Folder;
 using test::Json;
@@ -427,3 +428,5 @@ TEST_CASE("Jobs that could not run are refused with a sentence") {
                          std::string(2000, 'b') + " --layer-prefix " + std::string(2000, 'c')),
                  "at most 4000 characters"));
 }
+
+}  // namespace braid::test_farm

@@ -14,7 +14,7 @@
 #include "renderer/film/box_sum.h"
 #include "renderer/film/film.h"
 
-using namespace braid;
+namespace braid::test_film {
 
 namespace {
 
@@ -386,3 +386,5 @@ TEST_CASE("features: mean, halves and variance") {
   film.commit(6, target);
   CHECK(film.mean(6).at(0, 0) == 0);
 }
+
+}  // namespace braid::test_film

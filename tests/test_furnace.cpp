@@ -7,8 +7,9 @@
 #include "renderer/transport/bsdf.h"
 #include "tests/render_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_furnace {
+
+using namespace test;
 
 namespace {
 
@@ -227,3 +228,5 @@ TEST_CASE("furnace: clear glass in a white environment cannot be seen") {
     for (const float v : estimateOf(result).mean[1].data) CHECK(v == doctest::Approx(1).epsilon(1e-5));
   }
 }
+
+}  // namespace braid::test_furnace

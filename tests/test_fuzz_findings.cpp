@@ -8,7 +8,7 @@
 
 #include "tests/fuzz/targets.h"
 
-using namespace braid;
+namespace braid::test_fuzz_findings {
 
 TEST_CASE("inputs that fuzzing found") {
   const std::filesystem::path found = BRAID_SOURCE_DIR "/tests/fuzz/found";
@@ -25,3 +25,5 @@ TEST_CASE("inputs that fuzzing found") {
   }
   CHECK(inputs > 0);
 }
+
+}  // namespace braid::test_fuzz_findings

@@ -10,8 +10,9 @@
 #include "renderer/scene/gltf.h"
 #include "tests/pass_means.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_gdpt {
+
+using namespace test;
 
 namespace {
 
@@ -310,3 +311,5 @@ TEST_CASE("gdpt: the background is exact") {
   CHECK(estimateOf(r).variance[1].at(0, 31) == 0);
   CHECK(estimateOf(r).variance[1].at(16, 16) > 0);
 }
+
+}  // namespace braid::test_gdpt

@@ -11,8 +11,9 @@
 
 #include "renderer/scene/tangents.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_gltf {
+
+using namespace test;
 
 namespace {
 
@@ -445,3 +446,5 @@ TEST_CASE("gltf: meshopt compression with a fallback buffer that has no data") {
     CHECK_ERROR(file, "correct byteOffset and byteLength");
   }
 }
+
+}  // namespace braid::test_gltf

@@ -5,8 +5,9 @@
 
 #include <algorithm>
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_gltf_errors {
+
+using namespace test;
 
 namespace {
 
@@ -370,3 +371,5 @@ TEST_CASE("gltf errors: wrong JSON types everywhere are problems, not crashes") 
     }
   }
 }
+
+}  // namespace braid::test_gltf_errors

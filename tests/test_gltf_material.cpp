@@ -4,8 +4,9 @@
 
 #include <cmath>
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_gltf_material {
+
+using namespace test;
 
 namespace {
 
@@ -240,3 +241,5 @@ TEST_CASE("gltf: all materials can be made double-sided") {
   options.doubleSided = true;
   CHECK(triangleFile().load(options).materials[0].doubleSided);
 }
+
+}  // namespace braid::test_gltf_material

@@ -5,8 +5,9 @@
 
 #include <cmath>
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_gltf_scene {
+
+using namespace test;
 
 namespace {
 
@@ -301,3 +302,5 @@ TEST_CASE("gltf: warnings reach the sink") {
   CHECK(lines.size() == scene.warnings.size());
   CHECK(lines.size() == 2);
 }
+
+}  // namespace braid::test_gltf_scene

@@ -7,8 +7,9 @@
 #include "renderer/scene/gltf.h"
 #include "tests/render_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_invariance {
+
+using namespace test;
 
 namespace {
 
@@ -249,3 +250,5 @@ TEST_CASE("invariance: low-discrepancy points need less than half of the passes 
   MESSAGE("relative error at 64 passes: independent ", error[0], ", sobol ", error[1], ", ratio ", error[1] / error[0]);
   CHECK(error[1] < 0.7 * error[0]);
 }
+
+}  // namespace braid::test_invariance

@@ -15,8 +15,9 @@
 #include "combiners/shrinkage.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_james_stein {
+
+using namespace test;
 
 namespace {
 
@@ -484,3 +485,5 @@ TEST_CASE("Whitened, a noisy lamp does not hide what Y gets wrong beside it") {
     CHECK(jamesStein(x, variance, y, whitened).factor[1][i] ==
           doctest::Approx(jamesStein(x, variance, y, box).factor[1][i]).epsilon(1e-4));
 }
+
+}  // namespace braid::test_james_stein

@@ -8,8 +8,9 @@
 #include "renderer/transport/bsdf.h"
 #include "tests/render_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_known_lighting {
+
+using namespace test;
 
 namespace {
 
@@ -285,3 +286,5 @@ TEST_CASE("known light: many emitters by power and by hierarchy give the same im
   MESSAGE("mean ", meanOf(power).value, " +- ", meanOf(power).error, " by power, ", meanOf(hierarchy).value, " +- ",
           meanOf(hierarchy).error, " by hierarchy");
 }
+
+}  // namespace braid::test_known_lighting

@@ -7,8 +7,9 @@
 #include "renderer/transport/fresnel.h"
 #include "tests/render_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_known_surfaces {
+
+using namespace test;
 
 namespace {
 
@@ -295,3 +296,5 @@ TEST_CASE("known surface: mirrored instances equal mirrored geometry") {
   checkSameGallery({left, right});
   checkSameGallery({left * glm::scale(Mat4(1), Vec3(0.8f, 1, -1.2f)), right});
 }
+
+}  // namespace braid::test_known_surfaces

@@ -9,6 +9,8 @@
 
 #include <doctest/doctest.h>
 
+namespace braid::test_layers {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -80,3 +82,5 @@ TEST_CASE("The check of the layers sees a wrong include") {
   CHECK_FALSE(allowed("combiners/auto.cpp", "renderer/session/session.h"));
   CHECK_FALSE(allowed("integrators/pt.cpp", "tools/cli.h"));
 }
+
+}  // namespace braid::test_layers

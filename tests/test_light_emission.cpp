@@ -9,8 +9,9 @@
 #include "tests/chi_squared.h"
 #include "tests/render_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_light_emission {
+
+using namespace test;
 
 namespace {
 
@@ -202,3 +203,5 @@ TEST_CASE("The reach of light tells a caustic of a small lamp from one of a larg
   CHECK(again.caustic == large.caustic);
   CHECK(again.causticVariance == large.causticVariance);
 }
+
+}  // namespace braid::test_light_emission

@@ -13,8 +13,9 @@
 #include "tests/render_fixture.h"
 #include "tools/combining.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_light_parts {
+
+using namespace test;
 
 namespace {
 
@@ -247,3 +248,5 @@ TEST_CASE("auto does without parts that are incomplete, and survives values that
     CHECK(apart < 1.05 * squaredError(autoOf(extreme.estimates, 0).result.image.mean, extreme.truth));
   }
 }
+
+}  // namespace braid::test_light_parts

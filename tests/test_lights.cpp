@@ -7,7 +7,8 @@
 #include "tests/counts.h"
 #include "tools/builtin_scenes.h"
 
-using namespace braid;
+namespace braid::test_lights {
+
 using test::Rng;
 
 namespace {
@@ -418,3 +419,5 @@ TEST_CASE("A scene without light has nothing to draw") {
   CHECK_FALSE(lights.sample(Vec3(0), {0, 1, 0}, false, 0.5f, Vec2(0.5f), s));
   CHECK(lights.pdfEnvironment({0, 1, 0}) == 0);
 }
+
+}  // namespace braid::test_lights

@@ -10,8 +10,9 @@
 #include "tests/bsdf_cases.h"
 #include "tests/chi_squared.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_lobe_groups {
+
+using namespace test;
 
 namespace {
 
@@ -173,3 +174,5 @@ TEST_CASE("lobe groups: what is broad") {
   CHECK((share(withClearcoat(lambert(), 0.1f)) > 0.5f && share(withClearcoat(lambert(), 0.1f)) < 1));
   CHECK(share(lambert(Spectrum(0))) == 1);  // black, but diffuse
 }
+
+}  // namespace braid::test_lobe_groups

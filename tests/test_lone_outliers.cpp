@@ -10,7 +10,7 @@
 #include "combiners/shrinkage.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
+namespace braid::test_lone_outliers {
 
 namespace {
 
@@ -144,3 +144,5 @@ TEST_CASE("A mirror image one pixel wide is not replaced by what a filter has ma
   CHECK(outliers >= 4);  // else this tests nothing
   CHECK(kept < 0.5 * replaced);
 }
+
+}  // namespace braid::test_lone_outliers

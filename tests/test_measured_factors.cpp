@@ -11,8 +11,9 @@
 #include "combiners/square_units.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_measured_factors {
+
+using namespace test;
 
 TEST_CASE("Measured factors are the best ones for the other half, by block and channel, without gated pixels") {
   const Case c = makeCase();
@@ -130,3 +131,5 @@ TEST_CASE("Noise that a biased image has of the unbiased one hides less of its e
   CHECK(error(0) > 1.5 * alone);
   CHECK(error(1) < 1.25 * alone);
 }
+
+}  // namespace braid::test_measured_factors

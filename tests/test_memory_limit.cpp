@@ -6,8 +6,9 @@
 #include "tests/command_line.h"
 #include "tools/memory_plan.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_memory_limit {
+
+using namespace test;
 
 namespace {
 
@@ -70,3 +71,5 @@ TEST_CASE("memory limits: what does not fit is refused while it is read") {
   CHECK(std::count(run.err.begin(), run.err.end(), '\n') == 1);
   CHECK(braidRun(folder, "info " + kScene + "--env sky.exr --memory-limit 1G").code == 0);
 }
+
+}  // namespace braid::test_memory_limit

@@ -7,7 +7,8 @@
 #include "renderer/film/state_file.h"
 #include "tests/command_line.h"
 
-using namespace braid;
+namespace braid::test_merge {
+
 using test::braidRun;
 using test::Folder;
 using test::readText;
@@ -161,3 +162,5 @@ TEST_CASE("Runs that cannot be resumed or merged are refused with a sentence") {
   CHECK(!std::filesystem::exists(folder.path / "m.exr"));
   CHECK(!std::filesystem::exists(folder.path / "b.exr"));
 }
+
+}  // namespace braid::test_merge

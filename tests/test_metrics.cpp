@@ -17,7 +17,7 @@
 #include "tools/metrics/metrics.h"
 #include "tools/metrics/tonemap.h"
 
-using namespace braid;
+namespace braid::test_metrics {
 
 namespace {
 
@@ -293,3 +293,5 @@ TEST_CASE("metrics do not depend on threads") {
     CHECK(values[0] == values[1]);
   }
 }
+
+}  // namespace braid::test_metrics

@@ -15,8 +15,9 @@
 #include "renderer/core/error.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_nfor {
+
+using namespace test;
 
 namespace {
 
@@ -421,3 +422,5 @@ TEST_CASE("The number of threads changes no bit of nfor") {
     CHECK(identical(usual.half[0], other.half[0]));
   }
 }
+
+}  // namespace braid::test_nfor

@@ -13,8 +13,9 @@
 #include "combiners/registry.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_nlm {
+
+using namespace test;
 
 namespace {
 
@@ -193,3 +194,5 @@ TEST_CASE("The number of threads changes no bit of non-local means") {
     CHECK(identical(usual, arena.execute([&] { return filtered(c); })));
   }
 }
+
+}  // namespace braid::test_nlm

@@ -9,8 +9,9 @@
 #include "combiners/registry.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_one_hot {
+
+using namespace test;
 
 TEST_CASE("One-hot: estimated errors of fixed images are right on average, and selections are one-hot") {
   CaseOptions o;
@@ -119,3 +120,5 @@ TEST_CASE("The SBF filter keeps constants, is the formula at a pixel, and does n
   }
   CHECK(static_cast<double>(blurred.at(9, 7)) == doctest::Approx(sum / norm).epsilon(1e-4));
 }
+
+}  // namespace braid::test_one_hot

@@ -10,8 +10,9 @@
 #include "renderer/core/error.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_oracles {
+
+using namespace test;
 
 namespace {
 
@@ -121,3 +122,5 @@ TEST_CASE("Without a reference, or with one of another size, nothing is made of 
   c.estimates.reference = Rgb<float>(20, 24);
   CHECK_THROWS_AS(runPipeline(c.estimates, {"ideal@sppm"}, options), Error);
 }
+
+}  // namespace braid::test_oracles

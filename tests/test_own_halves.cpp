@@ -12,8 +12,9 @@
 #include "tests/combiner_fixture.h"
 #include "tests/noisy_images.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_own_halves {
+
+using namespace test;
 
 namespace {
 
@@ -140,3 +141,5 @@ TEST_CASE("Denoisers whose halves share weights ask for the quarters that tell t
     }
   CHECK(sharing == 1);
 }
+
+}  // namespace braid::test_own_halves

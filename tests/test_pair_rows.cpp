@@ -11,7 +11,7 @@
 #include "combiners/uncorrelated_filter.h"
 #include "combiners/weight_filter.h"
 
-namespace braid {
+namespace braid::test_pair_rows {
 
 namespace {
 
@@ -121,4 +121,4 @@ TEST_CASE("Where the tiles lie changes no bit of an image of uncorrelated weight
   CHECK(ofWhole[0].data != whole[0][0].data);
 }
 
-}  // namespace braid
+}  // namespace braid::test_pair_rows

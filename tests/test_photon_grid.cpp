@@ -12,7 +12,8 @@
 #include "integrators/photon_grid.h"
 #include "tests/chi_squared.h"
 
-using namespace braid;
+namespace braid::test_photon_grid {
+
 using test::Rng;
 
 namespace {
@@ -140,3 +141,5 @@ TEST_CASE("photon grid: packed directions") {
       CHECK(glm::length(unpackDirection(packDirection(axis, bits), bits) - axis) < tolerance);
   }
 }
+
+}  // namespace braid::test_photon_grid

@@ -15,8 +15,9 @@
 #include "tests/combiner_fixture.h"
 #include "tests/noisy_images.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_photon_map_shrinkage {
+
+using namespace test;
 
 namespace {
 
@@ -151,3 +152,5 @@ TEST_CASE("The error of the prior beside a bright edge is in units of the bright
   CHECK(error.at(61, 45) < 0.01f);
   CHECK(error.at(61, 45) > 1e-4f);
 }
+
+}  // namespace braid::test_photon_map_shrinkage

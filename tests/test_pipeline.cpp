@@ -8,8 +8,9 @@
 #include "renderer/core/error.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_pipeline {
+
+using namespace test;
 
 namespace {
 
@@ -401,3 +402,5 @@ TEST_CASE("Names of layers have no dots and no folders") {
   CHECK(layerName("js@easy@nfor") == "js@easy@nfor");
   CHECK(layerName("external:/a/b/kpcn.out.exr:x.exr:y.exr") == "external-kpcn-out");
 }
+
+}  // namespace braid::test_pipeline

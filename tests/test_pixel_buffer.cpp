@@ -9,7 +9,7 @@
 
 #include "renderer/core/plane.h"
 
-using namespace braid;
+namespace braid::test_pixel_buffer {
 
 namespace {
 
@@ -94,3 +94,5 @@ TEST_CASE("A freed buffer serves smaller ones, each with a part of its own, unti
   dropKeptPixels();
   CHECK(all(Plane<float>(kWidth, 1000), 0));
 }
+
+}  // namespace braid::test_pixel_buffer

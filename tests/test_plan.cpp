@@ -6,8 +6,9 @@
 #include "renderer/scene/gltf.h"
 #include "tests/render_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_plan {
+
+using namespace test;
 
 namespace {
 
@@ -80,3 +81,5 @@ TEST_CASE("auto renders what it keeps: the headline is the photon map's, the sha
   CHECK(r.estimates->estimates[1].passes == 4);
   CHECK(sameBits(r.image, r.estimates->estimates[0].mean));
 }
+
+}  // namespace braid::test_plan

@@ -15,7 +15,8 @@
 #include "tests/running_braid.h"
 #include "tools/preview_board.h"
 
-using namespace braid;
+namespace braid::test_preview {
+
 using test::braidRun;
 using test::contains;
 using test::Folder;
@@ -334,3 +335,5 @@ TEST_CASE("Waiting for a change ends with one, with the time, and when the board
   board.close();
   CHECK(seconds(board.state()["version"], 20) < 10);
 }
+
+}  // namespace braid::test_preview

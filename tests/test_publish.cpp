@@ -7,7 +7,8 @@
 #include "tools/image_output.h"
 #include "tools/publication_schedule.h"
 
-using namespace braid;
+namespace braid::test_publish {
+
 using test::braidRun;
 using test::contains;
 using test::Folder;
@@ -203,3 +204,5 @@ TEST_CASE("The first of samples, time and error ends the run, and the record say
   CHECK(run.code == 1);
   CHECK(contains(run.err, "no image to estimate it from"));
 }
+
+}  // namespace braid::test_publish

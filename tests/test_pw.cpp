@@ -19,8 +19,9 @@
 #include <xmmintrin.h>
 #endif
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_pw {
+
+using namespace test;
 
 namespace {
 
@@ -472,3 +473,5 @@ TEST_CASE("Planes that an image of another renderer lacks are done without") {
   CHECK(filtered(noHalves, &featuresOf(c)).size() == 1);
   CHECK(error(noHalves, &featuresOf(c)) < 0.25 * noise);
 }
+
+}  // namespace braid::test_pw

@@ -12,8 +12,9 @@
 #include "tests/combiner_fixture.h"
 #include "tests/plain_window.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_pw1 {
+
+using namespace test;
 
 namespace {
 
@@ -254,3 +255,5 @@ TEST_CASE("Neither tiles nor threads change a bit of the first-order filter") {
     for (size_t i = 0; i < 3; ++i) CHECK(identical(usual.firstOrder[i], other.firstOrder[i]));
   }
 }
+
+}  // namespace braid::test_pw1

@@ -12,8 +12,9 @@
 #include "renderer/core/error.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_rdfc {
+
+using namespace test;
 
 namespace {
 
@@ -244,3 +245,5 @@ TEST_CASE("The number of threads changes no bit of RDFC") {
     CHECK(identical(usual.risk, other.risk));
   }
 }
+
+}  // namespace braid::test_rdfc

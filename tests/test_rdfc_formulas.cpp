@@ -12,8 +12,9 @@
 #include "combiners/mirror.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_rdfc_formulas {
+
+using namespace test;
 
 namespace {
 
@@ -248,3 +249,5 @@ TEST_CASE("The risk of a candidate is its squared error, on average") {
     CHECK(risk[k] < 2 * error[k]);
   }
 }
+
+}  // namespace braid::test_rdfc_formulas

@@ -20,7 +20,8 @@
 #include "tests/chi_squared.h"
 #include "tools/builtin_scenes.h"
 
-using namespace braid;
+namespace braid::test_registry {
+
 namespace fs = std::filesystem;
 
 namespace {
@@ -386,3 +387,5 @@ TEST_CASE("A transparent background gives the share of each pixel that is covere
     CHECK(std::fabs(covered - 0.3) < (i->correlation() == Correlation::CommonRandomNumbers ? 0.1146 : 0.0102));
   }
 }
+
+}  // namespace braid::test_registry

@@ -14,8 +14,9 @@
 #include "combiners/simd.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_regression {
+
+using namespace test;
 
 namespace {
 
@@ -446,3 +447,5 @@ TEST_CASE("Cancelled regressions return at once") {
   regress(scene.inputs(), s, &report);
   CHECK(report.models == 0);
 }
+
+}  // namespace braid::test_regression

@@ -10,7 +10,8 @@
 #include "renderer/film/state_file.h"
 #include "tests/running_braid.h"
 
-using namespace braid;
+namespace braid::test_robust_output {
+
 using test::braidRun;
 using test::contains;
 using test::Folder;
@@ -213,3 +214,5 @@ TEST_CASE("A folder that goes away while rendering ends in exit code 3, its file
   CHECK(readImage(gone / "o.exr").width == 32);
   CHECK(readStateFile(gone / "o.state").rounds() > 0);
 }
+
+}  // namespace braid::test_robust_output

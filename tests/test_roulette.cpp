@@ -6,8 +6,9 @@
 #include "renderer/scene/gltf.h"
 #include "tests/render_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_roulette {
+
+using namespace test;
 
 namespace {
 
@@ -84,3 +85,5 @@ TEST_CASE("roulette: the same mean, and the path tracer's has less noise for its
   CHECK(std::cbrt(overAbsorption) < 0.95);
   CHECK(std::cbrt(overNever) < 0.5);
 }
+
+}  // namespace braid::test_roulette

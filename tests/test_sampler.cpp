@@ -9,7 +9,7 @@
 #include "tests/chi_squared.h"
 #include "tests/render_fixture.h"
 
-using namespace braid;
+namespace braid::test_sampler {
 
 namespace {
 
@@ -230,3 +230,5 @@ TEST_CASE("sampler: the same arguments give the same numbers, the salt differs f
   CHECK(salts.pValue() > 1e-4);
   CHECK(a.salt(a.itemKey(9), 1) != a.salt(a.itemKey(9), 2));
 }
+
+}  // namespace braid::test_sampler

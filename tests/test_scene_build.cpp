@@ -10,7 +10,8 @@
 #include "tests/chi_squared.h"
 #include "tools/builtin_scenes.h"
 
-using namespace braid;
+namespace braid::test_scene_build {
+
 using test::Rng;
 
 namespace {
@@ -383,3 +384,5 @@ TEST_CASE("No ray leaves a closed sphere through its edges") {
     CHECK(vertices <= static_cast<int>(copy.triangles.size()) / 100);
   }
 }
+
+}  // namespace braid::test_scene_build

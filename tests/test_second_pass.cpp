@@ -9,8 +9,9 @@
 #include "combiners/second_pass.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_second_pass {
+
+using namespace test;
 
 namespace {
 
@@ -133,3 +134,5 @@ TEST_CASE("auto has less error with its second pass, over cases and samples" * d
   CAPTURE(std::exp(logarithms / cases));
   CHECK(std::exp(logarithms / cases) < 0.9);
 }
+
+}  // namespace braid::test_second_pass

@@ -15,8 +15,9 @@
 #include "tests/combiner_fixture.h"
 #include "tests/gltf_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_simple_methods {
+
+using namespace test;
 
 namespace {
 
@@ -320,3 +321,5 @@ TEST_CASE("oidn reports what its library says, and its absence in a sentence") {
   const auto absent = makeOidn(nullptr, "not installed here");
   CHECK(dynamic_cast<const OutsideMethod&>(*absent).obstacle() == "not installed here");
 }
+
+}  // namespace braid::test_simple_methods

@@ -9,7 +9,7 @@
 
 #include "combiners/simplex_solver.h"
 
-using namespace braid;
+namespace braid::test_simplex_solver {
 
 namespace {
 
@@ -167,3 +167,5 @@ TEST_CASE("Scaling a matrix and adding a constant to it do not change the weight
     CHECK(quadratic(m, b) < quadratic(m, w) + 1e-6 * largest(m));
   }
 }
+
+}  // namespace braid::test_simplex_solver

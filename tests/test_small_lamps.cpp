@@ -12,8 +12,9 @@
 #include "combiners/registry.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_small_lamps {
+
+using namespace test;
 
 namespace {
 
@@ -125,3 +126,5 @@ TEST_CASE(
       }
     }
 }
+
+}  // namespace braid::test_small_lamps

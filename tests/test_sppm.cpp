@@ -9,8 +9,9 @@
 #include "integrators/sppm_preparation.h"
 #include "tests/render_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_sppm {
+
+using namespace test;
 
 namespace {
 
@@ -250,3 +251,5 @@ TEST_CASE("sppm: what a pass stores is bounded, and thinning does not change the
   CHECK(meanOf(render(scene, s)).value == doctest::Approx(1 / 0.03).epsilon(0.03));
   CHECK(plan.text().find("sppm memory: at most ") != std::string::npos);
 }
+
+}  // namespace braid::test_sppm

@@ -9,8 +9,9 @@
 
 #include "tests/render_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_sppm_caustics {
+
+using namespace test;
 
 namespace {
 
@@ -88,3 +89,5 @@ TEST_CASE("sppm caustics: lamps of any size in reflections of any sharpness, as 
       CHECK(noise < 0.15);
     }
 }
+
+}  // namespace braid::test_sppm_caustics

@@ -9,8 +9,9 @@
 #include "renderer/core/hash.h"
 #include "tests/render_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_sppm_extremes {
+
+using namespace test;
 
 namespace {
 
@@ -190,3 +191,5 @@ TEST_CASE("sppm extremes: scaling the lights scales the image, scaling the world
     CHECK(meanOf(r).value == doctest::Approx(meanOf(plain).value).epsilon(0.02));
   }
 }
+
+}  // namespace braid::test_sppm_extremes

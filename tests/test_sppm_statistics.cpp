@@ -12,8 +12,9 @@
 #include "renderer/scene/gltf.h"
 #include "tests/render_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_sppm_statistics {
+
+using namespace test;
 
 namespace {
 
@@ -202,3 +203,5 @@ TEST_CASE("error map: a biased estimate's is variance plus squared bias, an unbi
   one.bias = Rgb<float>(1, 1, 0.5f);
   CHECK(errorMap(one)[0] == doctest::Approx(0.25));
 }
+
+}  // namespace braid::test_sppm_statistics

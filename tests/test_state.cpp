@@ -11,7 +11,8 @@
 #include "tests/command_line.h"
 #include "tests/render_fixture.h"
 
-using namespace braid;
+namespace braid::test_state {
+
 using test::Folder;
 using test::integrators;
 using test::readText;
@@ -472,3 +473,5 @@ TEST_CASE("A failed write leaves the earlier file and no other") {
                        Error);
   CHECK_THROWS_AS(writeStateFile(folder.path, state), Error);
 }
+
+}  // namespace braid::test_state

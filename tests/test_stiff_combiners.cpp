@@ -18,8 +18,9 @@
 #include "combiners/recipe.h"
 #include "tests/stiff_inputs.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_stiff_combiners {
+
+using namespace test;
 
 namespace {
 
@@ -389,3 +390,5 @@ TEST_CASE("Regressions on collinear and constant features report their condition
     }
   }
 }
+
+}  // namespace braid::test_stiff_combiners

@@ -15,7 +15,7 @@
 #include "renderer/film/film.h"
 #include "renderer/film/moments.h"
 
-using namespace braid;
+namespace braid::test_stiff_film {
 
 namespace {
 
@@ -344,3 +344,5 @@ TEST_CASE("Biases, features and coverage of stiff passes stay finite, and consta
   CHECK(features.mean(6)[5] == kMost);
   CHECK(coverage.mean()[outside] == 0.1f);
 }
+
+}  // namespace braid::test_stiff_film

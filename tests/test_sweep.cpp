@@ -20,7 +20,8 @@
 #include "tools/sweep_summary.h"
 #include "tools/sweep_table.h"
 
-using namespace braid;
+namespace braid::test_sweep {
+
 using test::Folder;
 
 namespace {
@@ -452,3 +453,5 @@ TEST_CASE("Denoisers and combiners are measured on the render that pt is measure
     CHECK(box.values[0] != pt.values[0]);
   }
 }
+
+}  // namespace braid::test_sweep

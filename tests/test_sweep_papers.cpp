@@ -19,7 +19,8 @@
 #include "tools/sweep_pipeline.h"
 #include "tools/sweep_preset.h"
 
-using namespace braid;
+namespace braid::test_sweep_papers {
+
 using test::Folder;
 
 namespace {
@@ -210,3 +211,5 @@ TEST_CASE("The preset fills in what was not given, and every method of it can ru
   CHECK(unmeasured == 2);
   CHECK(atEqualTime >= 3);
 }
+
+}  // namespace braid::test_sweep_papers

@@ -17,7 +17,8 @@
 #include "tools/sweep_summary.h"
 #include "tools/sweep_table.h"
 
-using namespace braid;
+namespace braid::test_sweep_summary {
+
 using test::Folder;
 
 namespace {
@@ -206,3 +207,5 @@ TEST_CASE("Pictures are encoded and crops lie where errors are") {
   CHECK(shrunk(wide, 4).width() == 3);
   CHECK(shrunk(wide, 4)[0].at(2, 1) == 2);
 }
+
+}  // namespace braid::test_sweep_summary

@@ -17,7 +17,8 @@
 #include "tests/running_braid.h"
 #include "tools/tev_client.h"
 
-using namespace braid;
+namespace braid::test_tev {
+
 using test::braidRun;
 using test::contains;
 using test::Folder;
@@ -341,3 +342,5 @@ TEST_CASE("A viewer that vanishes in the middle of a render ends nothing") {
   CHECK(process.wait() == 0);
   CHECK(readImage(folder.path / "o.exr").width == 64);
 }
+
+}  // namespace braid::test_tev

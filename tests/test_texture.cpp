@@ -12,7 +12,8 @@
 #include "renderer/core/error.h"
 #include "renderer/scene/texture.h"
 
-using namespace braid;
+namespace braid::test_texture {
+
 namespace fs = std::filesystem;
 
 namespace {
@@ -229,3 +230,5 @@ TEST_CASE("texture: what cannot be decoded is an error of one line") {
   CHECK(reason({0xAB, 'K', 'T', 'X', ' ', '2', '0', 0xBB}).find("KTX2") != std::string::npos);
   CHECK_THROWS_AS(readImageFile("/no/such/image.png"), Error);
 }
+
+}  // namespace braid::test_texture

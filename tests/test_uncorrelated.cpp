@@ -14,8 +14,9 @@
 #include "combiners/uncorrelated_noise.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_uncorrelated {
+
+using namespace test;
 
 namespace {
 
@@ -433,3 +434,5 @@ TEST_CASE("Tiny and huge images of differences stay finite") {
     for (const double s : uncorrelatedScores(groups, a, 1)) CHECK(std::isfinite(s));
   }
 }
+
+}  // namespace braid::test_uncorrelated

@@ -12,8 +12,9 @@
 #include "combiners/uncorrelated_share.h"
 #include "tests/combiner_fixture.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_uncorrelated_share {
+
+using namespace test;
 
 namespace {
 
@@ -244,3 +245,5 @@ TEST_CASE("A rare strong sample is shared out and not lost, on average over the 
     CHECK(kept < 1.1);
   }
 }
+
+}  // namespace braid::test_uncorrelated_share

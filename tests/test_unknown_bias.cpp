@@ -14,8 +14,9 @@
 #include "tests/combiner_fixture.h"
 #include "tests/noisy_images.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_unknown_bias {
+
+using namespace test;
 
 namespace {
 
@@ -145,3 +146,5 @@ TEST_CASE("double-shrinkage of a photon map with outliers does not depend on wha
   for (Estimate& e : c.estimates.estimates) e.quarter.clear();
   CHECK_FALSE(identical(alone, image({"double-shrinkage@sppm"})));
 }
+
+}  // namespace braid::test_unknown_bias

@@ -8,8 +8,9 @@
 #include "renderer/scene/gltf.h"
 #include "tests/calibration.h"
 
-using namespace braid;
-using namespace braid::test;
+namespace braid::test_vcm {
+
+using namespace test;
 
 namespace {
 
@@ -89,3 +90,5 @@ TEST_CASE("calibration: vcm's reported variance is true") {
     calibration.add(renderWith(scene, "vcm", clampedSettings(24, 24, 16, SamplerKind::Independent, seed)));
   checkCalibration(calibration, "vcm independent", false);
 }
+
+}  // namespace braid::test_vcm

@@ -6,8 +6,9 @@
 #include "renderer/transport/warp.h"
 #include "tests/chi_squared.h"
 
-using namespace braid;
-using braid::test::Rng;
+namespace braid::test_warp {
+
+using test::Rng;
 
 namespace {
 
@@ -129,3 +130,5 @@ TEST_CASE("warp: a wrong density is found") {
                        [](const Vec3& w) { return cosineHemispherePdfW(w) * (1 + 0.1f * w.x); }, 5);
   CHECK(result.pValue < 1e-4);
 }
+
+}  // namespace braid::test_warp
