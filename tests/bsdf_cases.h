@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Materials for the BSDF tests: each lobe alone and the mixtures that occur.
+// Materials for the BSDF tests: each lobe alone and the mixtures that occur; how they look from the other side.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
 
+#include "renderer/transport/bsdf.h"
 #include "renderer/transport/surface.h"
 
 namespace braid::test {
@@ -143,6 +145,24 @@ inline std::vector<Vec3> viewDirections() {
     result.push_back(Vec3(r * std::cos(phi), r * std::sin(phi), z));
   }
   return result;
+}
+
+inline Vec3 mirrored(const Vec3& w) { return Vec3(w.x, w.y, -w.z); }
+
+inline bool usable(const Spectrum& s) { return isFinite(s) && minComponent(s) >= 0; }
+
+// Difference in units of the larger.
+inline double relative(double a, double b) { return std::fabs(a - b) / std::max({std::fabs(a), std::fabs(b), 1e-6}); }
+
+// The material as seen from wi when it transmits wo: the roles of both sides exchanged.
+inline SurfaceParameters otherSide(SurfaceParameters p) {
+  p.entering = !p.entering;
+  p.clearcoatNormal = Vec3(-p.clearcoatNormal.x, -p.clearcoatNormal.y, p.clearcoatNormal.z);
+  return p;
+}
+
+inline Bsdf exchanged(const SurfaceParameters& p, const Vec3& wi, Transport transport = Transport::Radiance) {
+  return wi.z > 0 ? Bsdf(p, wi, transport) : Bsdf(otherSide(p), mirrored(wi), transport);
 }
 
 }  // namespace braid::test

@@ -10,6 +10,7 @@
 
 #include <sys/wait.h>
 
+#include "tests/contains.h"
 #include "tests/gltf_fixture.h"
 
 namespace braid::test {

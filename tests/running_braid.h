@@ -18,8 +18,6 @@ namespace braid::test {
 
 inline const std::string kCornellFile = BRAID_SOURCE_DIR "/scenes/cornell.glb";
 
-inline bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
-
 // Complete lines only: a killed process may have begun one more.
 inline std::vector<Json> records(const fs::path& path) {
   std::vector<Json> all;

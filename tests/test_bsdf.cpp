@@ -15,23 +15,6 @@ using namespace test;
 
 namespace {
 
-Vec3 mirrored(const Vec3& w) { return Vec3(w.x, w.y, -w.z); }
-
-bool usable(const Spectrum& s) { return isFinite(s) && minComponent(s) >= 0; }
-
-double relative(double a, double b) { return std::fabs(a - b) / std::max({std::fabs(a), std::fabs(b), 1e-6}); }
-
-// The material as seen from wi when it transmits wo: the roles of both sides exchanged.
-SurfaceParameters otherSide(SurfaceParameters p) {
-  p.entering = !p.entering;
-  p.clearcoatNormal = Vec3(-p.clearcoatNormal.x, -p.clearcoatNormal.y, p.clearcoatNormal.z);
-  return p;
-}
-
-Bsdf exchanged(const SurfaceParameters& p, const Vec3& wi, Transport transport = Transport::Radiance) {
-  return wi.z > 0 ? Bsdf(p, wi, transport) : Bsdf(otherSide(p), mirrored(wi), transport);
-}
-
 Vec3 exchangedDirection(const Vec3& wo, const Vec3& wi) { return wi.z > 0 ? wo : mirrored(wo); }
 
 struct Albedo {

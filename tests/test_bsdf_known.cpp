@@ -12,14 +12,6 @@ namespace braid::test_bsdf_known {
 
 using namespace test;
 
-namespace {
-
-Vec3 mirrored(const Vec3& w) { return Vec3(w.x, w.y, -w.z); }
-
-bool usable(const Spectrum& s) { return isFinite(s) && minComponent(s) >= 0; }
-
-}  // namespace
-
 TEST_CASE("bsdf: mirrors, clear glass and total reflection") {
   const Vec3 wo = glm::normalize(Vec3(0.6f, 0.2f, 0.5f));
   BsdfSample s;

@@ -19,6 +19,7 @@
 namespace braid::test_cli {
 
 using test::braidRun;
+using test::contains;
 using test::Folder;
 using test::Json;
 using test::readText;
@@ -26,8 +27,6 @@ using test::Run;
 namespace fs = std::filesystem;
 
 namespace {
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 size_t lines(const std::string& text) { return static_cast<size_t>(std::count(text.begin(), text.end(), '\n')); }
 

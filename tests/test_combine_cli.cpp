@@ -21,6 +21,7 @@
 namespace braid::test_combine_cli {
 
 using test::braidRun;
+using test::contains;
 using test::Folder;
 using test::identical;
 using test::readText;
@@ -42,8 +43,6 @@ Run combined(const Folder& folder, const std::string& rest) {
   REQUIRE(run.code == 0);
   return run;
 }
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 const Attribute* attribute(const ImageFile& file, const std::string& name) {
   for (const Attribute& a : file.attributes)

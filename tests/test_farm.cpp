@@ -13,6 +13,7 @@
 namespace braid::test_farm {
 
 using test::braidRun;
+using test::contains;
 using test::Folder;
 using test::Json;
 using test::readText;
@@ -25,8 +26,6 @@ using Calls = std::map<std::string, Words>;  // by passes, or "merge"
 
 const std::string kCornell = "'" BRAID_SOURCE_DIR "/scenes/cornell.glb'";
 const std::string kUgly = "o'hara \"$HOME\" `id` \\n #LAYER# #IFRAME# 100% ;&|<>()*?[]{}~!, größe 漢字 😀";
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 void write(const std::filesystem::path& path, const std::string& text, bool program = false) {
   std::ofstream(path, std::ios::binary) << text;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Broken glTF files are refused with every problem, its place and the mend; nothing crashes, hangs or takes unbounded
 // memory.
+#include "tests/contains.h"
 #include "tests/gltf_fixture.h"
 
 #include <algorithm>
@@ -16,8 +17,6 @@ std::string errorOfBytes(const std::string& bytes, const std::string& name = "a.
   const std::string path = folder.write(name, bytes);
   return errorOf([&] { loadGltf(path); });
 }
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 #define CHECK_BYTES(bytes, part)                  \
   do {                                            \

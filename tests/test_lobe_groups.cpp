@@ -18,16 +18,6 @@ namespace {
 
 constexpr LobeGroup kGroups[] = {LobeGroup::Broad, LobeGroup::Narrow};
 
-double relative(double a, double b) { return std::fabs(a - b) / std::max({std::fabs(a), std::fabs(b), 1e-6}); }
-
-// The material as seen from wi when it transmits wo: the roles of both sides exchanged.
-Bsdf exchanged(SurfaceParameters p, const Vec3& wi) {
-  if (wi.z > 0) return Bsdf(p, wi);
-  p.entering = !p.entering;
-  p.clearcoatNormal = Vec3(-p.clearcoatNormal.x, -p.clearcoatNormal.y, p.clearcoatNormal.z);
-  return Bsdf(p, Vec3(wi.x, wi.y, -wi.z));
-}
-
 // Mean weight of samples, stratified in the directions, and its standard error.
 std::pair<double, double> albedo(const Bsdf& bsdf, Rng& rng) {
   constexpr int kSide = 64;

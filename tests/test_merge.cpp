@@ -10,6 +10,7 @@
 namespace braid::test_merge {
 
 using test::braidRun;
+using test::contains;
 using test::Folder;
 using test::readText;
 using test::Run;
@@ -18,8 +19,6 @@ namespace {
 
 const std::string kCornell = "'" BRAID_SOURCE_DIR "/scenes/cornell.glb'";
 const std::string kView = " -q --size 26x17 --integrator pt,sppm --transparent --reproducible ";
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 void must(const Folder& folder, const std::string& arguments) {
   const Run run = braidRun(folder, arguments);

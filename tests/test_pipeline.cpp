@@ -7,6 +7,7 @@
 #include "combiners/registry.h"
 #include "renderer/core/error.h"
 #include "tests/combiner_fixture.h"
+#include "tests/contains.h"
 
 namespace braid::test_pipeline {
 
@@ -42,8 +43,6 @@ std::vector<std::string> namesOf(const Recipe& recipe) {
   for (const Step& s : recipe.steps) names.push_back(s.name);
   return names;
 }
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 std::string usageError(const Facts& facts, const std::string& name) {
   try {

@@ -13,14 +13,13 @@
 
 namespace braid::test_state {
 
+using test::contains;
 using test::Folder;
 using test::integrators;
 using test::readText;
 namespace fs = std::filesystem;
 
 namespace {
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 // A box with a sphere of mirror-like metal: something for photons and splats, and rays that miss.
 const Scene& scene() {
