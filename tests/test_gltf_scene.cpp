@@ -41,6 +41,15 @@ TEST_CASE("gltf: transforms multiply down the tree") {
   CHECK(isNear(Vec3(scene.instances[0].toWorld * Vec4(1, 0, 0, 0)), Vec3(0, 2, 0)));
 }
 
+TEST_CASE("gltf: transforms are multiplied as doubles") {
+  GltfFile file = triangleFile();
+  file.root["nodes"] = {
+      {{"translation", {6371000.123, 0, 0}}, {"children", {1}}},
+      {{"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -6371000, 0, 0, 0.99999994}}, {"children", {2}}},
+      {{"mesh", 0}}};
+  CHECK(std::abs(origin(file.load()).x - 0.123f) < 1e-6f);
+}
+
 TEST_CASE("gltf: a mesh used twice is kept once") {
   GltfFile file = triangleFile();
   file.root["nodes"] = {{{"mesh", 0}}, {{"mesh", 0}, {"scale", {-1, 1, 1}}}};

@@ -152,17 +152,19 @@ std::string JsonRef::text(const std::string& fallback) const {
   return fallback;
 }
 
-float JsonRef::real(float fallback) const {
+double JsonRef::number(double fallback) const {
   if (!value_) return fallback;
   if (!value_->is_number()) {
     problem("is " + brief(*value_) + "; it must be a number");
     return fallback;
   }
   const double value = value_->get<double>();
-  if (std::abs(value) <= static_cast<double>(std::numeric_limits<float>::max())) return static_cast<float>(value);
+  if (std::abs(value) <= static_cast<double>(std::numeric_limits<float>::max())) return value;
   problem("is " + brief(*value_) + ", too large for a 32-bit float; write a smaller number");
   return fallback;
 }
+
+float JsonRef::real(float fallback) const { return static_cast<float>(number(static_cast<double>(fallback))); }
 
 float JsonRef::clamped(float fallback, float low, float high) const {
   const float value = real(fallback);
@@ -203,7 +205,7 @@ std::vector<uint32_t> JsonRef::indices(size_t count, const char* what) const {
   return list;
 }
 
-bool JsonRef::reals(float* out, size_t count) const {
+bool JsonRef::reals(double* out, size_t count) const {
   if (!value_) return false;
   if (!value_->is_array() || value_->size() != count) {
     const std::string actual = value_->is_array() ? std::to_string(value_->size()) + " entries" : brief(*value_);
@@ -211,10 +213,17 @@ bool JsonRef::reals(float* out, size_t count) const {
     return false;
   }
   const size_t before = report_->problemCount();
-  std::vector<float> values(count);
-  for (size_t i = 0; i < count; ++i) values[i] = at(i).real(0);
+  std::vector<double> values(count);
+  for (size_t i = 0; i < count; ++i) values[i] = at(i).number(0);
   if (report_->problemCount() != before) return false;
   std::copy(values.begin(), values.end(), out);
+  return true;
+}
+
+bool JsonRef::reals(float* out, size_t count) const {
+  std::vector<double> values(count);
+  if (!reals(values.data(), count)) return false;
+  std::transform(values.begin(), values.end(), out, [](double v) { return static_cast<float>(v); });
   return true;
 }
 

@@ -79,10 +79,13 @@ class JsonRef {
   std::vector<uint32_t> indices(size_t count, const char* what) const;
   // Exactly `count` numbers; returns whether they were there and right.
   bool reals(float* out, size_t count) const;
+  bool reals(double* out, size_t count) const;
   std::vector<float> realList() const;
   std::vector<std::string> textList() const;
 
  private:
+  double number(double fallback) const;
+
   const nlohmann::json* value_;
   std::string pointer_;
   Report* report_;

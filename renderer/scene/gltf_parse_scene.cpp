@@ -10,17 +10,19 @@ namespace braid::gltf {
 namespace {
 
 void parseTransform(Node& node, const JsonRef& json) {
-  float m[16];
+  double m[16];
   if (json["matrix"].reals(m, 16)) {
-    node.matrix = glm::dmat4(glm::make_mat4(m));
     if (json["translation"] || json["rotation"] || json["scale"]) {
       json.warn("a node has both a matrix and translation, rotation or scale; the matrix is used");
     }
-    if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1) {
-      json["matrix"].problem("is not affine; its last row must be 0 0 0 1");
-    }
+    // Inverses and products come out with rounding in the last row; only more than that is a projection.
+    const double off = std::max({std::abs(m[3]), std::abs(m[7]), std::abs(m[11]), std::abs(m[15] - 1)});
+    if (!(off <= 1e-5)) json["matrix"].problem("is not affine; its last row must be 0 0 0 1");
+    m[3] = m[7] = m[11] = 0;
+    m[15] = 1;
+    node.matrix = glm::make_mat4(m);
   }
-  float t[3], s[3], r[4];
+  double t[3], s[3], r[4];
   if (json["translation"].reals(t, 3)) node.translation = glm::dvec3(t[0], t[1], t[2]);
   if (json["scale"].reals(s, 3)) node.scale = glm::dvec3(s[0], s[1], s[2]);
   if (!json["rotation"].reals(r, 4)) return;
