@@ -2,12 +2,19 @@
 #include "integrators/braid.h"
 
 #include "integrators/registry.h"
+#include "renderer/session/default_light.h"
 
 namespace braid {
 
 std::unique_ptr<Scene> load(const std::string& path, const LoadOptions& options, const SceneOptions& sceneOptions,
                             const LogSink& log) {
-  return std::make_unique<Scene>(loadGltf(path, options, log), sceneOptions);
+  auto scene = std::make_unique<Scene>(loadGltf(path, options, log), sceneOptions);
+  if (!options.defaultLight) return scene;
+  const Settings usual;
+  const std::optional<std::string> warning =
+      lightIfDark(*scene, scene->data().cameras.front(), usual.width, usual.height);
+  if (warning && log) log(LogLevel::Warning, path + ": " + *warning);
+  return scene;
 }
 
 RenderPlan plan(const Scene& scene, const Settings& settings, const CameraData& camera) {

@@ -222,7 +222,7 @@ std::pair<std::unique_ptr<Scene>, CameraData> openScene(const SceneSource& sourc
   choice.isa = o.isa;
   SceneData data = source.load();
   const CameraData camera = chooseCamera(data, choice);
-  return {buildScene(std::move(data), choice), camera};
+  return {buildScene(std::move(data), choice, camera), camera};
 }
 
 // Denoisers and combiners instead of rays.

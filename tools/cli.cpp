@@ -8,6 +8,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/stopwatch.h"
+#include "renderer/session/default_light.h"
 
 namespace braid {
 
@@ -106,7 +107,8 @@ void addSceneOptions(CLI::App& command, SceneChoice& c) {
                      "Radiance r,g,b seen by camera rays that miss, instead of the environment");
   command.add_option("--light-scale", c.lightScale, "Multiply every light and emitter of the file")
       ->capture_default_str();
-  command.add_flag("--no-default-light", c.noDefaultLight, "No grey dome for a file without lights");
+  command.add_flag("--no-default-light", c.noDefaultLight,
+                   "No grey dome where the file's lights leave the picture dark");
   command.add_flag("--allow-external", c.load.allowExternal,
                    "Follow symbolic links that lead from the scene's folder to elsewhere");
   command.add_flag("--double-sided", c.load.doubleSided, "Treat every material as double-sided");
@@ -168,11 +170,17 @@ SceneData loadScene(const SceneChoice& c, LoadTimes* times) {
   return data;
 }
 
-std::unique_ptr<Scene> buildScene(SceneData data, const SceneChoice& c) {
+std::unique_ptr<Scene> buildScene(SceneData data, const SceneChoice& c, const CameraData& camera) {
   SceneOptions options;
   options.isa = c.isa == "auto" ? "" : c.isa;
   options.full = c.full;
-  return std::make_unique<Scene>(std::move(data), options);
+  auto scene = std::make_unique<Scene>(std::move(data), options);
+  if (c.noDefaultLight || !c.environment.empty()) return scene;
+  const auto [width, height] = parseSize(c.size);
+  const std::optional<std::string> warning =
+      lightIfDark(*scene, camera, width, height, static_cast<float>(c.lightScale));
+  if (warning && !c.quiet) fmt::print(stderr, "warning: {}: {}\n", c.file, *warning);
+  return scene;
 }
 
 CameraData chooseCamera(const SceneData& data, const SceneChoice& c) {

@@ -87,7 +87,9 @@ void addSampleOptions(CLI::App& command, SampleChoice& choice);
 // Loads the file with everything the choice changes in it (environment, light scale); warnings go to standard error
 // unless quiet.
 SceneData loadScene(const SceneChoice& choice, LoadTimes* times = nullptr);
-std::unique_ptr<Scene> buildScene(SceneData data, const SceneChoice& choice);
+// Builds what rays need, and adds the default light where the camera would see next to nothing; the warning goes to
+// standard error unless quiet.
+std::unique_ptr<Scene> buildScene(SceneData data, const SceneChoice& choice, const CameraData& camera);
 // The camera that the choice names. Throws Error(Usage) listing the cameras when there is none of that name.
 CameraData chooseCamera(const SceneData& data, const SceneChoice& choice);
 // Settings from the two groups of options.

@@ -81,7 +81,9 @@ void print(const nlohmann::json& j) {
 
 int runInfo(InfoOptions o) {
   o.scene.quiet = o.scene.quiet || o.json;  // warnings are in the record
-  const std::unique_ptr<Scene> scene = buildScene(loadScene(o.scene), o.scene);
+  SceneData data = loadScene(o.scene);
+  const CameraData camera = chooseCamera(data, o.scene);
+  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
   const nlohmann::json record = describe(*scene);
   if (o.json)
     fmt::print("{}\n", record.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));

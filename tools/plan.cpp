@@ -107,7 +107,7 @@ int runPlan(const PlanOptions& o) {
   if (o.tasks > 0) splitPasses(settings.spp, o.tasks);  // wrong numbers before the scene is loaded
   SceneData data = loadScene(o.scene);
   const CameraData camera = chooseCamera(data, o.scene);
-  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene);
+  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
   const auto integrators = makeIntegrators();
   Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
   const Recipe recipe = planCombining(o.image.combine, settings.spp, plan);

@@ -165,7 +165,7 @@ int runPreview(PreviewOptions o) {
 
   SceneData data = loadScene(o.scene);
   const CameraData camera = chooseCamera(data, o.scene);
-  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene);
+  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
   const auto integrators = makeIntegrators();
   Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
   const Recipe recipe = planPreview(plan, o, audience);

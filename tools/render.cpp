@@ -225,7 +225,7 @@ int runRender(const RenderOptions& o) {
   LoadTimes times;
   SceneData data = loadScene(o.scene, &times);
   const CameraData camera = chooseCamera(data, o.scene);
-  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene);
+  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
   const auto integrators = makeIntegrators();
   Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
   // The passes of all machines will be combined, of which a share has few.

@@ -98,7 +98,7 @@ int runReplay(const ReplayOptions& o) {
                                              settings.width, settings.height));
   SceneData data = loadScene(o.scene);
   const CameraData camera = chooseCamera(data, o.scene);
-  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene);
+  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
   const auto integrators = makeIntegrators();
   const Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
   const TransportContext context(*scene, settings.lightStrategy);

@@ -31,7 +31,8 @@ std::vector<StateOption> sceneIdentity(const SceneChoice& c, const SceneData& da
           {"--variant", c.load.variant},
           {"--frame-time", fmt::format("{}", c.frameTime)},
           {"--double-sided", yesOrNo(c.load.doubleSided)},
-          {"--no-default-light", yesOrNo(c.noDefaultLight)}};
+          {"--no-default-light", yesOrNo(c.noDefaultLight)},
+          {"the default light", yesOrNo(data.defaultLight)}};
 }
 
 }  // namespace braid

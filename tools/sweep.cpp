@@ -331,6 +331,7 @@ bool Sweep::runScene(size_t index, const std::vector<SweepJob>& jobs) {
   choice.file = o_.scenes[index];
   choice.isa = o_.isa;
   choice.quiet = o_.quiet;
+  choice.size = o_.size;  // of its shape depends what the camera sees
   SweepScene scene;
   scene.name = names_[index];
   scene.file = choice.file;
@@ -338,7 +339,7 @@ bool Sweep::runScene(size_t index, const std::vector<SweepJob>& jobs) {
   SceneData data = loadScene(choice, &times);
   scene.loadSeconds = times.load;
   scene.camera = chooseCamera(data, choice);
-  scene.scene = buildScene(std::move(data), choice);
+  scene.scene = buildScene(std::move(data), choice, scene.camera);
   scene.planned = plannedIntegrators(scene);
   if (!findReference(scene)) return false;
   recordScene(scene);

@@ -2,6 +2,8 @@
 // Entry of the loader: read, check, build, and give the scene what its file lacks.
 #include "renderer/scene/gltf.h"
 
+#include <algorithm>
+
 #include "renderer/scene/gltf_document.h"
 #include "renderer/scene/gltf_material.h"
 #include "renderer/scene/gltf_nodes.h"
@@ -49,9 +51,12 @@ void addDefaults(SceneData& scene, const LoadOptions& options, Report& report) {
     report.warn("", "the file has no camera; one is added that sees the whole scene");
   }
   if (options.defaultLight && !hasLight(scene)) {
-    scene.environment = EnvironmentData{nullptr, Spectrum(0.5f), 0};
+    const bool dark = !scene.lights.empty() || std::any_of(scene.materials.begin(), scene.materials.end(),
+                                                           [](const Material& m) { return m.emissive(); });
+    scene.environment = EnvironmentData{nullptr, Spectrum(kDefaultDome), 0};
     scene.defaultLight = true;
-    report.warn("", "the file has no light; a grey dome of radiance 0.5 is added");
+    report.warn("", std::string(dark ? "the lights of the file emit nothing" : "the file has no light") +
+                        "; a grey dome of radiance 0.5 is added (--no-default-light: none)");
   }
 }
 

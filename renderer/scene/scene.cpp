@@ -64,6 +64,14 @@ Scene::Scene(SceneData data, const SceneOptions& options) : data_(std::move(data
   times_.hierarchy = building.seconds();
 }
 
+void Scene::addDefaultLight(const Spectrum& radiance, const std::string& warning) {
+  data_.environment = EnvironmentData{nullptr, radiance, 0};
+  data_.defaultLight = true;
+  data_.warnings.push_back(warning);
+  environment_.emplace(*data_.environment);
+  traits_.flags |= kTraitEnvironment;
+}
+
 // Meshes placed once are baked into world space, which spares every ray the instance transform; meshes placed several
 // times keep one copy. Meshes with the same list of placements form a group, so that a tree's trunk and leaves are one
 // instance.

@@ -78,6 +78,11 @@ Vec3 viewDirection(const SceneData& scene, const Bounds& bounds) {
   return glm::normalize(Vec3(0.55f, 0.4f, 1));
 }
 
+bool shines(const PunctualLight& light) {
+  return maxComponent(light.intensity) > 0 && light.range > 0 &&
+         (light.kind != PunctualKind::Spot || light.outerConeAngle > 0);
+}
+
 Mat4 lookAlong(const Vec3& position, const Vec3& back) {
   const Vec3 up = std::abs(back.y) > 0.999f ? Vec3(0, 0, -1) : Vec3(0, 1, 0);
   const Vec3 x = glm::normalize(glm::cross(up, back));
@@ -120,8 +125,11 @@ CameraData framingCamera(const SceneData& scene) {
 }
 
 bool hasLight(const SceneData& scene) {
-  if (!scene.lights.empty() || scene.environment) return true;
-  return std::any_of(scene.materials.begin(), scene.materials.end(), [](const Material& m) { return m.emissive(); });
+  if (scene.environment || std::any_of(scene.lights.begin(), scene.lights.end(), shines)) return true;
+  return std::any_of(scene.materials.begin(), scene.materials.end(), [&](const Material& m) {
+    if (!m.emissive()) return false;
+    return !m.emissiveTexture || !scene.textures[static_cast<size_t>(m.emissiveTexture.texture)].isBlack(m.emission);
+  });
 }
 
 }  // namespace braid

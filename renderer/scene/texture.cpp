@@ -272,6 +272,19 @@ Vec4 Texture::sample(Vec2 uv) const {
   }
 }
 
+bool Texture::isBlack(const Spectrum& factor) const {
+  constexpr int kDarkest = 2;
+  const auto stride = static_cast<size_t>(channels_), colours = channels_ < 3 ? size_t(1) : size_t(3);
+  const float least = image_->integerFloats ? kDarkest / 255.0f : 0.0f;
+  const size_t count = static_cast<size_t>(width_) * static_cast<size_t>(height_);
+  for (size_t i = 0; i < count; ++i)
+    for (size_t c = 0; c < colours; ++c) {
+      const bool wanted = colours == 1 || factor[static_cast<int>(c)] > 0;
+      if (wanted && (bytes_ ? bytes_[i * stride + c] > kDarkest : floats_[i * stride + c] > least)) return false;
+    }
+  return true;
+}
+
 size_t Texture::bytes() const { return image_ ? image_->bytes.size() + image_->floats.size() * sizeof(float) : 0; }
 
 std::shared_ptr<const Image> decodeImage(const uint8_t* data, size_t bytes, const std::string& name) {

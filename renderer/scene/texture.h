@@ -38,6 +38,10 @@ class Texture {
   // is 1.
   Vec4 sample(Vec2 uv) const;
 
+  // Whether no texel has any of the wanted colour channels (a factor that is not 0): nothing brighter than the two
+  // darkest steps of 8 bits, which black is after a lossy compression.
+  bool isBlack(const Spectrum& factor) const;
+
   const Image& image() const { return *image_; }
   std::shared_ptr<const Image> sharedImage() const { return image_; }
   bool srgb() const { return srgb_; }

@@ -40,12 +40,18 @@ double chanceToHit(double area, float length) {
 class VisibleCells {
  public:
   explicit VisibleCells(const Vec3& camera, float smallest) : camera_(camera), smallest_(smallest) {}
-  void add(const Vec3& p, double weight) { cells_[keyOf(p, sizeOf(p))] += weight; }
+  void add(const Vec3& p, const Vec3& normal, double weight) {
+    const uint64_t key = keyOf(p, sizeOf(p));
+    cells_[key] += weight;
+    sides_[sideOf(key, normal)] += weight;
+    total_ += weight;
+  }
+  double total() const { return total_; }
   // Weight per m² of surface at a point.
-  double density(const Vec3& p) const {
-    const float size = sizeOf(p);
-    const auto found = cells_.find(keyOf(p, size));
-    return found == cells_.end() ? 0 : found->second / sqr(static_cast<double>(size));
+  double density(const Vec3& p) const { return densityIn(cells_, p, keyOf(p, sizeOf(p))); }
+  // The same of surfaces that face roughly the same way: cells are larger than walls are thick.
+  double density(const Vec3& p, const Vec3& normal) const {
+    return densityIn(sides_, p, sideOf(keyOf(p, sizeOf(p)), normal));
   }
 
  private:
@@ -59,9 +65,17 @@ class VisibleCells {
     for (int c = 0; c < 3; ++c) key = hashCombine(key, std::bit_cast<uint32_t>(cell[c] + 0.0f));
     return key;
   }
+  static uint64_t sideOf(uint64_t key, const Vec3& normal) {
+    return hashCombine(key, (normal.x > 0 ? 1u : 0u) + (normal.y > 0 ? 2u : 0u) + (normal.z > 0 ? 4u : 0u));
+  }
+  double densityIn(const std::unordered_map<uint64_t, double>& cells, const Vec3& p, uint64_t key) const {
+    const auto found = cells.find(key);
+    return found == cells.end() ? 0 : found->second / sqr(static_cast<double>(sizeOf(p)));
+  }
   Vec3 camera_;
   float smallest_;
-  std::unordered_map<uint64_t, double> cells_;
+  double total_ = 0;
+  std::unordered_map<uint64_t, double> cells_, sides_;
 };
 
 WalkSettings probeWalk(Transport transport) {
@@ -80,7 +94,7 @@ VisibleCells findVisibleCells(const TransportContext& context, const PassSampler
   const auto onHit = [&](int, const SubpathState& state, const SubpathVertex& vertex) {
     if (!(state.leastPdfW > kFocusingPdf)) return false;
     if (!vertex.bsdf.hasNonDelta()) return true;
-    cells.add(vertex.hit.position, static_cast<double>(average(vertex.throughput)));
+    cells.add(vertex.hit.position, vertex.hit.ng, static_cast<double>(average(vertex.throughput)));
     return true;
   };
   for (int first = 0; first < kEyePaths; first += kBatch) {
@@ -108,7 +122,7 @@ LightReach measureLightReach(const TransportContext& context, const Camera& came
   const PassSampler sampler(SamplerKind::Independent, kSeed, 0, 0, 1);
   const VisibleCells visible = findVisibleCells(context, sampler, camera, width, height);
   const std::map<uint32_t, double> areas = lampAreas(scene);
-  double total = 0;
+  double total = 0, scattered = 0;
   const auto onHit = [&](int, const SubpathState& state, const SubpathVertex& vertex) {
     if (vertex.woBelow) return false;
     if (!vertex.bsdf.hasNonDelta()) return true;
@@ -116,6 +130,9 @@ LightReach measureLightReach(const TransportContext& context, const Camera& came
     const double value = density * static_cast<double>(average(vertex.throughput * vertex.bsdf.albedo()));
     if (!(value > 0) || !std::isfinite(value)) return true;
     total += value;
+    if (vertex.segments > 1)
+      scattered +=
+          visible.density(vertex.hit.position, vertex.hit.ng) * static_cast<double>(average(vertex.throughput));
     if (vertex.segments == 1) {
       reach.direct += value;
     } else if (state.leastPdfW > kFocusingPdf) {
@@ -151,6 +168,8 @@ LightReach measureLightReach(const TransportContext& context, const Camera& came
   if (total > 0)
     for (double* share : {&reach.direct, &reach.indirect, &reach.caustic, &reach.causticVariance, &reach.unreachable})
       *share /= total;
+  if (scattered > 0 && std::isfinite(scattered))
+    reach.scatteredRadiance = scattered / (static_cast<double>(kPi) * kPaths * visible.total());
   return reach;
 }
 

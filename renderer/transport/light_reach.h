@@ -18,6 +18,9 @@ struct LightReach {
   // of hitting the light over the focusing surface. 1 is as bad as a signal that one path in two sees.
   double causticVariance = 0;
   double unreachable = 0;  // of the caustics: from points and directions, which no camera path can hit
+  // Not a share: the radiance that all light but the direct gives to a white surface, averaged over what the camera
+  // sees, W/(m² sr).
+  double scatteredRadiance = 0;
 };
 
 // A pure function of the scene and the camera. Costs about as much as a pass of 128 x 128 pixels.

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// The light that a scene gets whose own lights do not light what the camera sees.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "renderer/scene/scene.h"
+
+namespace braid {
+
+// Adds the grey dome where the lights of the file light less than a hundredth of what the camera sees, and returns what
+// to tell the user: that, or that the picture stays dark all the same. A pure function of the scene, the camera and the
+// shape of the frame, so that every command and every machine decides alike. Nothing is added to scenes with an
+// environment or without anything that emits (the loader has decided on these) and where all that is seen is unlit.
+//
+// The light is compared with that of the dome, or with the radiance of the brightest emitter where that is less, so
+// that a scene of dim lamps is as lit as the same scene with bright ones. `scale` is --light-scale, by which all lights
+// of the scene have been multiplied.
+std::optional<std::string> lightIfDark(Scene& scene, const CameraData& camera, int width, int height, float scale = 1);
+
+}  // namespace braid

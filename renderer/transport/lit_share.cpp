@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/transport/lit_share.h"
+
+#include <array>
+#include <cmath>
+
+#include "renderer/transport/shadow_ray.h"
+#include "renderer/transport/subpath.h"
+
+namespace braid {
+
+namespace {
+
+constexpr int kPaths = 4096;
+constexpr uint64_t kSeed = 0x6c6974;
+constexpr int kMaxSegments = 12;
+// From so much weight on, a share this large is no accident of where the first paths went.
+constexpr double kEnoughSeen = 128, kEnoughLit = 0.1;
+
+// Evenly spread over the frame from the first points on: additive recurrence by the powers of the plastic number
+// (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences").
+Vec2 framePoint(int i) {
+  const double x = 0.5 + 0.7548776662466927 * i, y = 0.5 + 0.5698402909980532 * i;
+  return {static_cast<float>(x - std::floor(x)), static_cast<float>(y - std::floor(y))};
+}
+
+float emittedTowards(const Scene& scene, const Hit& hit) {
+  if (!hit.material->emissive() || !(hit.front || hit.material->doubleSided)) return 0;
+  return average(scene.emission(*hit.mesh, hit.triangle, hit.u, hit.v));
+}
+
+// What the paths of one batch see.
+class Glance {
+ public:
+  Glance(const TransportContext& context, const PassSampler& sampler) : context_(context), sampler_(sampler) {}
+
+  bool onHit(int index, const SubpathVertex& vertex) {
+    const auto i = static_cast<size_t>(index);
+    met_ = true;
+    if (vertex.hit.material->unlit) return false;
+    level_[i] += emittedTowards(context_.scene, vertex.hit);
+    if (!vertex.bsdf.hasNonDelta()) return true;
+    weight_[i] = average(vertex.throughput);
+    sampleLight(i, vertex);
+    return false;
+  }
+  // A mirror that shows the void is seen, and dark.
+  void onMiss(int index, const SubpathState& state) {
+    if (state.segments > 1) weight_[static_cast<size_t>(index)] = average(state.throughput);
+  }
+
+  void addTo(LitShare& sum, double reference) {
+    std::array<bool, kBatch> hidden{};
+    context_.scene.accel().occluded(rays_, shadows_, hidden.data());
+    for (int k = 0; k < shadows_; ++k)
+      if (!hidden[static_cast<size_t>(k)]) level_[owner_[static_cast<size_t>(k)]] += arriving_[static_cast<size_t>(k)];
+    for (size_t i = 0; i < weight_.size(); ++i) {
+      const double weight = static_cast<double>(weight_[i]);
+      if (!(weight > 0) || !std::isfinite(weight)) continue;
+      sum.seen += weight;
+      sum.share += weight * std::min(1.0, static_cast<double>(level_[i]) / reference);
+    }
+    sum.seesSurfaces = sum.seesSurfaces || met_;
+  }
+
+ private:
+  void sampleLight(size_t i, const SubpathVertex& vertex) {
+    const SampleBlock u = sampler_.block(vertex.key, static_cast<unsigned>(vertex.segments));
+    const Hit& hit = vertex.hit;
+    LightSample light;
+    if (!context_.lights.sample(hit.position, vertex.receiverNormal(), vertex.twoSided, u.u[slot::kLightSelect],
+                                {u.u[slot::kLightU], u.u[slot::kLightV]}, light))
+      return;
+    // As in the path tracer: from the side that is seen by both normals, unless the surface transmits.
+    const float shading = glm::dot(light.wi, hit.frame.n);
+    const bool reflects = glm::dot(light.wi, hit.ng) > 0;
+    if (reflects != (shading > 0) || (!reflects && !vertex.twoSided)) return;
+    const float cosine = std::abs(shading);
+    const float value = average(light.radiance) * cosine * kInvPi / light.pdfW;
+    if (!(value > 0) || !std::isfinite(value)) return;
+    const auto k = static_cast<size_t>(shadows_);
+    owner_[k] = i;
+    arriving_[k] = value;
+    const uint32_t salt = sampler_.salt(vertex.key, 0) & ~kCameraRay;
+    rays_.set(shadows_++, shadowRay(hit, light.wi, light.distance, salt));
+  }
+
+  const TransportContext& context_;
+  const PassSampler& sampler_;
+  std::array<float, kBatch> weight_{}, level_{}, arriving_{};
+  std::array<size_t, kBatch> owner_{};
+  ShadowBatch rays_;
+  int shadows_ = 0;
+  bool met_ = false;
+};
+
+}  // namespace
+
+LitShare measureLitShare(const TransportContext& context, const Camera& camera, int width, int height,
+                         double reference) {
+  WalkSettings settings;
+  settings.maxSegments = kMaxSegments;
+  settings.roulette = {Roulette::kNever, 1};
+  settings.mis = false;
+  const PassSampler sampler(SamplerKind::Independent, kSeed, 0, 0, 1);
+  const MediaStack media = mediaOfCamera(context.scene, camera);
+  const Vec2 frame(static_cast<float>(width), static_cast<float>(height));
+  SubpathBatch batch(context, sampler, settings);
+  LitShare lit;
+  for (int first = 0; first < kPaths; first += kBatch) {
+    batch.clear();
+    for (int i = first; i < first + kBatch; ++i)
+      batch.startCamera(sampler.itemKey(static_cast<uint64_t>(i)), camera.ray(framePoint(i) * frame), media, 1, 1,
+                        camera.orthographic());
+    Glance glance(context, sampler);
+    batch.run([&](int index, const SubpathState&, const SubpathVertex& v) { return glance.onHit(index, v); },
+              [&](int index, const SubpathState& state) { glance.onMiss(index, state); });
+    glance.addTo(lit, reference);
+    if (lit.seen > kEnoughSeen && lit.share > kEnoughLit * lit.seen) break;
+  }
+  if (lit.seen > 0) lit.share /= lit.seen;
+  return lit;
+}
+
+}  // namespace braid
