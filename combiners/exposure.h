@@ -17,12 +17,14 @@ namespace braid {
 double exposureScale(const Rgb<float>& image);
 
 struct SanitiseReport {
-  uint64_t nonFinite = 0;         // values set to 0
+  uint64_t nonFinite = 0;         // values set to 0, unless they are filled
+  uint64_t filled = 0;            // pixels of colours, filled from the other half or their neighbours
   uint64_t negativeVariance = 0;  // values set to 0
   uint64_t outOfRange = 0;        // values moved to the limit
   bool clean() const { return nonFinite == 0 && negativeVariance == 0 && outOfRange == 0; }
   SanitiseReport& operator+=(const SanitiseReport& other) {
     nonFinite += other.nonFinite;
+    filled += other.filled;
     negativeVariance += other.negativeVariance;
     outOfRange += other.outOfRange;
     return *this;
@@ -37,7 +39,7 @@ struct PlanesRead {
   bool lightParts = true;
 };
 
-// The estimates as methods see them. Non-finite values and negative variances become 0. Colours and biases are
+// The estimates as methods see them. Non-finite values, which fillInvalid() leaves none of, and negative variances become 0. Colours and biases are
 // multiplied by k, variances by k². Colours and features beyond ±10⁹ are moved to that limit, and variances beyond its
 // square, so that fourth powers stay within floats; the sun in a dark room is below it. What was changed is added to
 // the report.

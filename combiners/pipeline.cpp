@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 
 #include <fmt/format.h>
 
 #include "combiners/half_estimate.h"
+#include "combiners/invalid_pixels.h"
 #include "combiners/plane_mean.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
@@ -60,7 +62,7 @@ class Runner {
  public:
   explicit Runner(const PipelineOptions& options) : options_(options) {}
 
-  // Takes of the estimates what the recipe reads.
+  // Takes of the estimates what the recipe reads, without invalid pixels.
   void normalise(const Estimates& estimates, const Recipe& recipe);
   // Makes estimates of the earlier images that steps read.
   void keepEarlier(const Recipe& recipe);
@@ -72,15 +74,17 @@ class Runner {
   PipelineResult result;
 
  private:
+  void take(const Recipe& recipe);
   const Estimate* estimate(const std::string& name) const;
   GivenQuarters givenQuarters(const std::string& name) const;
   MethodInputs inputsOf(const Step& step) const;
-  std::string missingInput(const Step& step) const;
+  std::string missingInput(const Step& step, bool& failed) const;
   double inputSeconds(const Step& step) const;
 
   using Earlier = std::pair<std::string, uint64_t>;  // name, passes
 
-  Estimates all_;  // normalised; so are the results until finish()
+  Estimates all_;                    // normalised; so are the results until finish()
+  std::optional<Estimates> filled_;  // a copy of the given ones without invalid pixels, if there are any
   const Estimates* given_ = nullptr;
   const Features* features_ = nullptr;   // the given ones, if they are fit as they are
   std::map<Earlier, Estimate> earlier_;  // images of checkpoints
@@ -89,16 +93,29 @@ class Runner {
 
 void Runner::normalise(const Estimates& estimates, const Recipe& recipe) {
   given_ = &estimates;
+  take(recipe);
+  if (result.sanitised.nonFinite == 0) return;
+  const SanitiseReport found = result.sanitised;
+  filled_ = estimates;
+  const uint64_t filled = fillInvalid(*filled_);
+  given_ = &*filled_;
+  result.sanitised = {};
+  take(recipe);
+  result.sanitised.nonFinite = found.nonFinite;
+  result.sanitised.filled = filled;
+}
+
+void Runner::take(const Recipe& recipe) {
   std::string unbiased;
   for (const Step& step : recipe.steps)
     if (unbiased.empty()) unbiased = step.unbiased;
-  const Estimate* e = estimates.find(unbiased);
+  const Estimate* e = given_->find(unbiased);
   result.exposure = options_.exposure > 0 ? options_.exposure : e ? exposureScale(e->mean) : 1.0;
   PlanesRead read = planesRead(recipe);
-  const bool fit = read.features && estimates.features && isSane(*estimates.features, read.featureNoise);
+  const bool fit = read.features && given_->features && isSane(*given_->features, read.featureNoise);
   read.features = read.features && !fit;
-  all_ = normalised(estimates, result.exposure, result.sanitised, read);
-  features_ = fit ? &*estimates.features : all_.features ? &*all_.features : nullptr;
+  all_ = normalised(*given_, result.exposure, result.sanitised, read);
+  features_ = fit ? &*given_->features : all_.features ? &*all_.features : nullptr;
 }
 
 void Runner::keepEarlier(const Recipe& recipe) {
@@ -132,11 +149,12 @@ GivenQuarters Runner::givenQuarters(const std::string& name) const {
 }
 
 // What a method made may lack halves that the recipe could not know of, or may have failed.
-std::string Runner::missingInput(const Step& step) const {
+std::string Runner::missingInput(const Step& step, bool& failed) const {
   std::vector<std::string> names = step.bases;
   if (!step.biased.empty()) names.push_back(step.biased);
   for (const std::string& name : names) {
     const PipelineOutput* made = result.find(name);
+    if (made && made->failed) failed = true;
     if (made && !made->ran()) return fmt::format("needs {}, which did not run: {}", name, made->step.obstacle);
     const Estimate* e = estimate(name);
     if (!e) return fmt::format("needs {}, which there is not", name);
@@ -207,7 +225,7 @@ double Runner::inputSeconds(const Step& step) const {
 
 void Runner::run(Step step, bool last) {
   PipelineOutput out;
-  if (step.obstacle.empty()) step.obstacle = missingInput(step);
+  if (step.obstacle.empty()) step.obstacle = missingInput(step, out.failed);
   if (step.obstacle.empty()) {
     MethodInputs in = inputsOf(step);
     for (Estimate& e : all_.estimates)
@@ -218,6 +236,7 @@ void Runner::run(Step step, bool last) {
       cancellable(in.cancel, [&] { out.result = step.method->run(in); });
     } catch (const Error& e) {
       step.obstacle = e.what();
+      out.failed = true;
     }
     out.seconds = clock.seconds();
     out.meanOverUnbiased = meanOf(out.result.image.mean) / unbiasedMean;
@@ -228,9 +247,11 @@ void Runner::run(Step step, bool last) {
     image.unbiased = false;
     image.passes = unbiased ? unbiased->passes : 0;
     image.seconds = out.seconds;
-    if (step.obstacle.empty() && (image.mean.width() != all_.width || image.mean.height() != all_.height))
+    if (step.obstacle.empty() && (image.mean.width() != all_.width || image.mean.height() != all_.height)) {
       step.obstacle = fmt::format("its image has {}x{} pixels instead of {}x{}", image.mean.width(),
                                   image.mean.height(), all_.width, all_.height);
+      out.failed = true;
+    }
   }
   out.step = std::move(step);
   result.outputs.push_back(std::move(out));

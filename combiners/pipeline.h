@@ -29,6 +29,7 @@ struct PipelineOptions {
 struct PipelineOutput {
   Step step;                    // the method, its inputs by name, and the obstacle if it did not run
   MethodResult result;          // in the units of the estimates; image.name is the step's name
+  bool failed = false;          // it, or an input of it, was run and failed: that may be otherwise another time
   double seconds = 0;           // of the method itself
   double meanOverUnbiased = 1;  // of the images: what part of the light is left; not a number for a black image
   double inputSeconds = 0;      // of the denoisers and combiners that it reads, each once

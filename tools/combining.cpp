@@ -199,11 +199,14 @@ void CombinedLayers::add(const std::string& name, const Rgb<float>* image, const
 std::vector<std::string> combineWarnings(const PipelineResult& result) {
   std::vector<std::string> lines;
   const SanitiseReport& s = result.sanitised;
-  if (!s.clean())
+  if (s.nonFinite > 0)
     lines.push_back(
-        fmt::format("inputs of combiners: {} values that were not finite and {} negative variances count as "
-                    "0, {} values were limited",
-                    s.nonFinite, s.negativeVariance, s.outOfRange));
+        fmt::format("inputs of combiners: {} values are not finite and have no weight: {} pixels of colours are filled "
+                    "from the other half or their neighbours",
+                    s.nonFinite, s.filled));
+  if (s.negativeVariance > 0 || s.outOfRange > 0)
+    lines.push_back(fmt::format("inputs of combiners: {} negative variances count as 0, {} values were limited",
+                                s.negativeVariance, s.outOfRange));
   for (const PipelineOutput& out : result.outputs) {
     if (!out.ran()) lines.push_back(fmt::format("{} did not run: {}", out.step.name, out.step.obstacle));
     if (!out.step.note.empty()) lines.push_back(fmt::format("{} {}", out.step.name, out.step.note));

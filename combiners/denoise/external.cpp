@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "combiners/exposure.h"
+#include "combiners/invalid_pixels.h"
 #include "combiners/outside_method.h"
 #include "combiners/pipeline.h"
 #include "combiners/registry.h"
@@ -86,14 +87,11 @@ MethodResult External::run(const MethodInputs& in) const {
     e.half[0] = checked(file, "halfA", like);
     e.half[1] = checked(file, "halfB", like);
   }
+  const auto filled = static_cast<int64_t>(fillInvalid(e));
   SanitiseReport report;
   // Files hold the units of the render; what methods see is exposure-normalised.
   e = normalised(e, in.options.number(kPipelineExposure), report);
-  Attribute bad;
-  bad.name = "nonFiniteInputs";
-  bad.kind = Attribute::Kind::Int;
-  bad.integer = static_cast<int64_t>(report.nonFinite);
-  if (report.nonFinite > 0) result.remarks.push_back(bad);
+  if (filled > 0) result.remarks.push_back({"filledPixels", Attribute::Kind::Int, "", filled, 0, {}});
   return result;
 }
 
