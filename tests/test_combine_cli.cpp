@@ -211,8 +211,9 @@ TEST_CASE("Cycles' passes are read, noisy or denoised by what they are for") {
   const Estimates plain = readEstimates(readImage(path), {"image", ImageRole::Noisy, 0, &notes});
   CHECK(plain.estimates[0].mean[0][0] == 1);
   CHECK_FALSE(plain.features.has_value());
-  REQUIRE(notes.size() == 1);
-  CHECK(contains(notes[0], "no albedo and no normal"));
+  REQUIRE(notes.size() == 2);
+  CHECK(contains(notes[0], "reads 'ViewLayer.Combined'"));
+  CHECK(contains(notes[1], "no albedo and no normal"));
 }
 
 TEST_CASE("Mitsuba's AOVs and second moments are read") {
@@ -244,18 +245,23 @@ TEST_CASE("Two renders of another renderer are halves, with a variance from thei
   combined(folder, "--unbiased a.exr,b.exr --method inverse-variance --denoiser box -o out.exr");
   CHECK(hasLayer(readImage(folder.path / "out.exr"), "Error"));
 
-  // One alone: what is missing is named, and what can be done with it.
-  const Run run = braidRun(folder, "combine --unbiased a.exr --method inverse-variance --denoiser box -o no.exr");
+  // One alone: what is missing is worked out from the image, and what cannot be is named.
+  const Run one = braidRun(folder, "combine --unbiased a.exr --method inverse-variance --denoiser box -o one.exr");
+  CHECK(one.code == 0);
+  CHECK(contains(one.err, "two renders with different seeds"));
+  const Run run = braidRun(folder, "combine --unbiased a.exr --method uncorrelated-uniform -o no.exr");
   CHECK(run.code == 2);
-  CHECK(contains(run.err, "inverse-variance cannot run: needs the halves of unbiased"));
-  CHECK(contains(run.err, "give two renders with different seeds"));
+  CHECK(contains(run.err, "uncorrelated-uniform cannot run: needs an estimate with correlated pixels"));
   CHECK(contains(run.err, "can run on these files: box"));
   CHECK_FALSE(fs::exists(folder.path / "no.exr"));
   combined(folder, "--unbiased a.exr --method box -o out.exr");
 
   // A denoised image of another renderer as the biased input, with its halves.
   writeChannels(folder.path / "d.exr", {"R", "G", "B"}, 1.25f);
-  combined(folder, "--unbiased a.exr,b.exr --biased d.exr,d.exr,d.exr --method inverse-variance -o out.exr");
+  writeChannels(folder.path / "e.exr", {"R", "G", "B"}, 1.5f);
+  combined(folder, "--unbiased a.exr,b.exr --biased d.exr,d.exr,e.exr --method inverse-variance -o out.exr");
+  CHECK(braidRun(folder, "combine --unbiased a.exr,b.exr --biased d.exr,d.exr,d.exr --method inverse-variance -o o.exr")
+            .code == 2);
   CHECK(braidRun(folder, "combine --unbiased a.exr,b.exr --biased d.exr --method inverse-variance -o out.exr").code ==
         2);
   combined(folder, "--unbiased a.exr --bases a.exr,d.exr --method average -o mean.exr");
@@ -356,9 +362,10 @@ TEST_CASE("auto filters direct and indirect light apart, offline as in process")
     CHECK(identical(a.rgb("combined.auto"), readImage(folder.path / "c.exr").rgb("combined.auto")));
   }
   // Parts of one file are not those of two files' mean.
+  REQUIRE(braidRun(folder, options + "--quarters --light-parts --seed 1 -o e.exr").code == 0);
   for (const char* parts : {"0", "1"})
     combined(folder,
-             std::string("--unbiased a.exr,b.exr --method auto -o two") + parts + ".exr --auto-light-parts " + parts);
+             std::string("--unbiased a.exr,e.exr --method auto -o two") + parts + ".exr --auto-light-parts " + parts);
   CHECK(identical(readImage(folder.path / "two0.exr").rgb("combined.auto"),
                   readImage(folder.path / "two1.exr").rgb("combined.auto")));
   combined(folder, "--unbiased a.exr --method auto --auto-light-parts 0 -o d.exr");

@@ -13,6 +13,7 @@
 #include "tools/combining.h"
 #include "tools/estimates_file.h"
 #include "tools/output_options.h"
+#include "tools/same_view.h"
 #include "version.h"
 
 namespace braid {
@@ -37,11 +38,13 @@ bool isFile(const std::string& text) {
 
 bool looksLikeFile(const std::string& text) { return text.find('.') != std::string::npos || isFile(text); }
 
-void checkSize(const std::string& file, int width, int height, const Estimates& all) {
-  if (width != all.width || height != all.height)
-    throw Error(ExitCode::BadInput, fmt::format("{}: {}x{} pixels, but the unbiased image has {}x{}", file, width,
-                                                height, all.width, all.height));
-}
+// What the files hold.
+struct Inputs {
+  Estimates estimates;
+  Plane<float> alpha;  // of the unbiased image; empty: none
+  ImageFile head;      // of its file
+  std::vector<std::string> notes;
+};
 
 bool samePixels(const Rgb<float>& a, const Rgb<float>& b) {
   for (size_t c = 0; c < 3; ++c)
@@ -53,7 +56,6 @@ bool samePixels(const Rgb<float>& a, const Rgb<float>& b) {
 // has been read already: two copies of an image would count as independent.
 template <class Fits>
 Estimate& addEstimate(Estimates& all, Estimates from, const std::string& file, const Fits& fits) {
-  checkSize(file, from.width, from.height, all);
   auto found = std::find_if(from.estimates.begin(), from.estimates.end(), fits);
   if (found == from.estimates.end() || file.find(':') != std::string::npos) found = from.estimates.begin();
   for (Estimate& e : all.estimates)
@@ -77,22 +79,37 @@ Estimates readBiased(const std::string& text, const ReadOptions& options) {
   return all;
 }
 
-Rgb<float> readReferenceImage(const std::string& file, const Estimates& all) {
+Rgb<float> readReferenceImage(const std::string& file, const Inputs& in) {
   const ImageFile image = readImage(file);
-  checkSize(file, image.width, image.height, all);
+  requireSameView(in.head, image);
   return image.rgb("");
 }
 
+// Files that methods read themselves.
+void checkExternal(const std::string& name, const Inputs& in) {
+  for (size_t begin = 0; begin <= name.size();) {  // FILE:HALFA:HALFB
+    const size_t end = std::min(name.find(':', begin), name.size());
+    if (const std::string file = name.substr(begin, end - begin); isFile(file))
+      requireSameView(in.head, readImage(file));
+    begin = end + 1;
+  }
+}
+
 // Fills the roles of the pipeline from the options; files become estimates.
-Estimates readInputs(const CombineOptions& o, PipelineOptions& pipeline, std::vector<std::string>& notes) {
-  ReadOptions read{"unbiased", ImageRole::Noisy, o.samplesPerPixel, &notes};
-  Estimates all = readEstimatesOption(o.unbiased, read);
+Inputs readInputs(const CombineOptions& o, PipelineOptions& pipeline) {
+  Inputs in;
+  ReadOptions read{"unbiased", ImageRole::Noisy, o.samplesPerPixel, &in.notes};
+  read.derive = true;
+  read.alpha = &in.alpha;
+  read.head = &in.head;
+  Estimates& all = in.estimates = readEstimatesOption(o.unbiased, read);
+  read = {"correlated", ImageRole::Noisy, o.samplesPerPixel, &in.notes};
+  read.like = &in.head;
   pipeline.roles.unbiased = defaultUnbiased(factsOf(all));
   if (pipeline.roles.unbiased.empty())
     throw Error(ExitCode::BadInput,
                 fmt::format("{}: holds no unbiased estimate with independent pixels, such as pt", o.unbiased));
   if (!o.correlated.empty()) {
-    read.foreignName = "correlated";
     Estimate& e = addEstimate(all, readEstimatesOption(o.correlated, read), o.correlated,
                               [](const Estimate& other) { return other.correlation != Correlation::Independent; });
     pipeline.roles.correlated = e.name;
@@ -100,7 +117,7 @@ Estimates readInputs(const CombineOptions& o, PipelineOptions& pipeline, std::ve
   }
   const std::string& biased = o.choice.biased;
   if (!biased.empty() && !all.find(biased) && !isMethod(biased) && looksLikeFile(biased) &&
-      biased.rfind("external:", 0) != 0) {
+      biased.rfind("external", 0) != 0) {
     read.foreignName = "biased";
     read.role = ImageRole::Denoised;
     Estimate& e =
@@ -108,10 +125,15 @@ Estimates readInputs(const CombineOptions& o, PipelineOptions& pipeline, std::ve
     pipeline.roles.biased = e.name;
     e.unbiased = false;
   }
-  if (!o.reference.empty()) all.reference = readReferenceImage(o.reference, all);
+  if (!o.reference.empty()) all.reference = readReferenceImage(o.reference, in);
   for (std::string& base : pipeline.roles.bases)
     if (!all.find(base) && base.find(':') == std::string::npos && isFile(base)) base = "external:" + base;
-  return all;
+  std::vector<std::string> names = pipeline.roles.bases;
+  for (const std::vector<std::string>& more : {o.choice.wanted(), pipeline.roles.denoisers, {biased}})
+    names.insert(names.end(), more.begin(), more.end());
+  for (const std::string& name : names)
+    if (const size_t at = name.find("external:"); at != std::string::npos) checkExternal(name.substr(at + 9), in);
+  return in;
 }
 
 // Names of what would run on these inputs, for a user whose choice does not.
@@ -133,10 +155,10 @@ int runCombine(const CombineOptions& o) {
   if (wanted.empty()) throw Error(ExitCode::Usage, "--method: name at least one method (braid --list)");
   for (const std::string& name : wanted) makeRecipe({}, {name}, {});  // unknown names first
   PipelineOptions pipeline = o.choice.options();
-  std::vector<std::string> notes;
-  Estimates all = readInputs(o, pipeline, notes);
+  Inputs in = readInputs(o, pipeline);
+  Estimates& all = in.estimates;
   if (!o.quiet)
-    for (const std::string& line : notes) fmt::print(stderr, "note: {}\n", line);
+    for (const std::string& line : in.notes) fmt::print(stderr, "note: {}\n", line);
 
   const Facts facts = factsOf(all);
   const Recipe recipe = makeRecipe(facts, wanted, pipeline.roles);
@@ -150,8 +172,10 @@ int runCombine(const CombineOptions& o) {
       throw Error(ExitCode::BadInput, fmt::format("{} cannot run: {}", name, out->step.obstacle));
 
   const Attribute version{"Software", Attribute::Kind::String, std::string("braid ") + BRAID_VERSION, 0, 0, {}};
-  all.attributes = estimateAttributes(all, !o.noTiming);
-  all.attributes.insert(all.attributes.begin(), version);
+  const std::vector<Attribute> derived = std::move(all.attributes);
+  all.attributes = {version};
+  for (const std::vector<Attribute>& list : {estimateAttributes(all, !o.noTiming), derived, viewAttributes(in.head)})
+    all.attributes.insert(all.attributes.end(), list.begin(), list.end());
   const CombinedLayers combined(result, wanted, o.choice.weights, !o.noTiming, all);
   BRAID_ASSERT(combined.headline());
   ExrOptions exr;
@@ -159,7 +183,7 @@ int runCombine(const CombineOptions& o) {
   exr.quarters = o.quarters;
   exr.floatHeadline = o.floatHeadline;
   exr.layers = combined.layers();
-  const WriteReport report = writeExr(o.output, all, *combined.headline(), nullptr, exr);
+  const WriteReport report = writeExr(o.output, all, *combined.headline(), in.alpha.empty() ? nullptr : &in.alpha, exr);
   if (!o.png.empty()) writePng(o.png, *combined.headline(), static_cast<float>(o.exposure));
   if (o.quiet) return 0;
   for (const std::string& line : combineWarnings(result)) fmt::print(stderr, "warning: {}\n", line);
@@ -182,8 +206,8 @@ void addCombine(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand("combine", "Denoise or combine the images of earlier renders");
   command
       ->add_option("--unbiased", o.unbiased,
-                   "FILE, or FILE:ESTIMATE of braid's; HALFA,HALFB: two renders with different seeds; or "
-                   "FILE,HALFA,HALFB")
+                   "FILE, or FILE:ESTIMATE of braid's, FILE:LAYER of others'; HALFA,HALFB: two renders with "
+                   "different seeds; or FILE,HALFA,HALFB")
       ->required();
   command->add_option("--correlated", o.correlated, "The same, for the estimate by common random numbers or gradients");
   command->add_option("--reference", o.reference,
@@ -205,13 +229,15 @@ void addCombine(CLI::App& app, Action& action) {
   command->add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
   command->add_option("--threads", o.threads, "Worker threads (default: all)")->check(CLI::Range(0, 4096));
   command->add_flag("-q,--quiet", o.quiet, "Errors only");
-  command->footer(methodList() +
-                  "METHOD@INPUT chooses the biased input of one method, e.g. js@ensemble.\n"
-                  "Examples:\n"
-                  "  braid combine --unbiased out.exr --method js -o js.exr\n"
-                  "  braid combine --unbiased out.exr --method js --biased ensemble --bases nfor,nlm -o js.exr\n"
-                  "  braid combine --unbiased seed1.exr,seed2.exr --biased denoised.exr --method average -o a.exr\n"
-                  "Files of pbrt, Mitsuba 3 and Cycles are read by their channel names.");
+  command->footer(
+      methodList() +
+      "METHOD@INPUT chooses the biased input of one method, e.g. js@ensemble.\n"
+      "Examples:\n"
+      "  braid combine --unbiased out.exr --method js -o js.exr\n"
+      "  braid combine --unbiased out.exr --method js --biased ensemble --bases nfor,nlm -o js.exr\n"
+      "  braid combine --unbiased seed1.exr,seed2.exr --biased denoised.exr --method average -o a.exr\n"
+      "Files of pbrt, Mitsuba 3 and Cycles are read by their channel names. Where one image is all there is, its\n"
+      "variance is estimated from neighbouring pixels, and halves are made from it (the header says so).");
   command->callback([options, &action] { action = [options] { return runCombine(*options); }; });
 }
 

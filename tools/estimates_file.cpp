@@ -9,9 +9,12 @@
 
 #include <fmt/format.h>
 
+#include "combiners/invalid_pixels.h"
+#include "combiners/spatial_variance.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 #include "tools/foreign_image.h"
+#include "tools/same_view.h"
 
 namespace braid {
 
@@ -162,6 +165,30 @@ void varianceFromHalves(Estimate& e, const std::string& file, std::vector<std::s
   if (notes) notes->push_back(fmt::format("{}: no variance: taken from the difference of the halves", file));
 }
 
+// Whether a file holds estimates of braid, with their statistics.
+bool isBraids(const ImageFile& file) { return !estimateNames(file).empty(); }
+
+// What a renderer left out.
+void deriveStatistics(Estimates& all, const std::string& file, std::vector<std::string>* notes) {
+  Estimate& e = all.estimates.front();
+  const bool noVariance = e.variance.empty(), noHalves = !complete(e.half);
+  const auto tell = [&](const char* attribute, const char* text) {
+    all.attributes.push_back({fmt::format("braid/{}/{}", e.name, attribute), Attribute::Kind::String, text, 0, 0, {}});
+    if (notes) notes->push_back(fmt::format("{}: {} of {}: {}", file, attribute, e.name, text));
+  };
+  if (noVariance) {
+    e.variance = spatialVariance(e.mean, all.features ? &*all.features : nullptr);
+    tell("variance", "estimated from the differences of neighbouring pixels, as the file tells none");
+  }
+  if (noHalves) {
+    makeHalves(e);
+    tell("halves",
+         "the image plus and minus noise of its variance, as there is only one: two renders with different "
+         "seeds, A.exr,B.exr, are better");
+  }
+  if ((noVariance || noHalves) && e.passes < 4) e.passes = 0;  // neither is what so few samples would tell
+}
+
 std::vector<std::string> splitFiles(const std::string& text) {
   std::vector<std::string> files(1);
   for (const char c : text)
@@ -172,7 +199,7 @@ std::vector<std::string> splitFiles(const std::string& text) {
   return files;
 }
 
-// FILE or FILE:NAME.
+// FILE or FILE:NAME, one of the estimates or layers.
 std::pair<std::string, std::string> splitName(const std::string& text) {
   std::error_code ignored;
   const size_t colon = text.rfind(':');
@@ -191,14 +218,39 @@ void moveToFront(Estimates& all, const std::string& name, const std::string& fil
   std::rotate(all.estimates.begin(), found, found + 1);
 }
 
-Rgb<float> colourLike(const std::string& path, const Estimates& all, const ReadOptions& options) {
+bool samePixels(const Rgb<float>& a, const Rgb<float>& b) {
+  for (size_t c = 0; c < 3; ++c)
+    if (!std::equal(a[c].data.begin(), a[c].data.end(), b[c].data.begin(), b[c].data.end())) return false;
+  return true;
+}
+
+// An image that belongs to another one.
+struct Companion {
+  ImageFile head;
+  Rgb<float> colour;
+  Plane<float> alpha;
+};
+
+// `layer`: where the file's name does not give one.
+Companion readCompanion(const std::string& text, const std::string& layer, const ImageFile& like,
+                        const ReadOptions& options) {
+  const auto [path, name] = splitName(text);
   const ImageFile file = readImage(path);
-  if (file.width != all.width || file.height != all.height)
-    throw Error(ExitCode::BadInput, fmt::format("{}: {}x{} pixels, but the image that it belongs to has {}x{}", path,
-                                                file.width, file.height, all.width, all.height));
-  return readEstimates(file, {options.foreignName, options.role, options.samplesPerPixel, nullptr})
-      .estimates.front()
-      .mean;
+  requireSameView(like, file);
+  Companion c{headOf(file), {}, {}};
+  ReadOptions plain{options.foreignName, options.role, options.samplesPerPixel};
+  plain.layer = name.empty() ? layer : name;
+  plain.alpha = &c.alpha;
+  Estimates all = readEstimates(file, plain);
+  if (!name.empty() && isBraids(file)) moveToFront(all, name, path);
+  c.colour = std::move(all.estimates.front().mean);
+  return c;
+}
+
+void requireDifferent(const Rgb<float>& a, const Rgb<float>& b, const std::string& text) {
+  if (samePixels(a, b))
+    throw Error(ExitCode::BadInput,
+                fmt::format("{}: the halves are the same pixels: give two renders with different seeds", text));
 }
 
 Rgb<float> meanOfHalves(const Estimate& e) {
@@ -225,14 +277,19 @@ std::vector<Attribute> estimateAttributes(const Estimates& all, bool timing) {
 
 Estimates readEstimates(const ImageFile& file, const ReadOptions& options) {
   const std::vector<std::string> layers = estimateNames(file);
-  if (!layers.empty()) return readBraid(file, layers);
+  if (!layers.empty()) {
+    if (const auto alpha = file.planes.find("A"); options.alpha && alpha != file.planes.end())
+      *options.alpha = alpha->second;
+    return readBraid(file, layers);
+  }
   Estimates all = emptyLike(file);
-  ForeignImage foreign = readForeign(file, options.role == ImageRole::Denoised, options.samplesPerPixel);
+  ForeignImage foreign = readForeign(file, options.role == ImageRole::Denoised, options.samplesPerPixel, options.layer);
   foreign.estimate.name = options.foreignName;
   foreign.estimate.unbiased = options.role == ImageRole::Noisy;
   all.estimates.push_back(std::move(foreign.estimate));
   all.features = std::move(foreign.features);
   if (options.notes) options.notes->insert(options.notes->end(), foreign.notes.begin(), foreign.notes.end());
+  if (options.alpha) *options.alpha = std::move(foreign.alpha);
   return all;
 }
 
@@ -241,25 +298,49 @@ Estimates readEstimatesOption(const std::string& text, const ReadOptions& option
   if (files.size() > 3 || std::count(files.begin(), files.end(), "") > 0)
     throw Error(ExitCode::Usage, fmt::format("'{}': expected FILE, or HALFA,HALFB, or FILE,HALFA,HALFB", text));
   const auto [path, name] = splitName(files[0]);
-  Estimates all = readEstimates(readImage(path), options);
-  if (!name.empty()) moveToFront(all, name, path);
+  const ImageFile file = readImage(path);
+  if (options.like) requireSameView(*options.like, file);
+  if (options.head) *options.head = headOf(file);
+  const bool braids = isBraids(file);
+  ReadOptions whole = options;
+  if (!braids) whole.layer = name;
+  Estimates all = readEstimates(file, whole);
+  if (!name.empty() && braids) moveToFront(all, name, path);
   Estimate& first = all.estimates.front();
   if (files.size() > 1) {  // parts of the light are those of the first file's image
     first.direct = {};
     first.indirectVariance = {};
   }
+  const ImageFile head = headOf(file);
   if (files.size() == 2) {
+    Companion other = readCompanion(files[1], name, head, options);
+    requireOtherSeed(head, other.head);
+    requireDifferent(first.mean, other.colour, text);
+    if (options.alpha && !options.alpha->empty() && !other.alpha.empty())
+      for (size_t i = 0; i < other.alpha.size(); ++i)
+        (*options.alpha)[i] = 0.5f * (*options.alpha)[i] + 0.5f * other.alpha[i];
     first.half[0] = first.mean;
-    first.half[1] = colourLike(files[1], all, options);
+    first.half[1] = std::move(other.colour);
     first.mean = meanOfHalves(first);
     first.variance = Rgb<float>();  // was that of one half
     first.passes *= 2;
     first.quarter.clear();
   } else if (files.size() == 3) {
-    for (size_t h = 0; h < 2; ++h) first.half[h] = colourLike(files[1 + h], all, options);
+    Companion a = readCompanion(files[1], name, head, options), b = readCompanion(files[2], name, head, options);
+    requireOtherSeed(a.head, b.head);
+    requireDifferent(a.colour, b.colour, text);
+    first.half[0] = std::move(a.colour);
+    first.half[1] = std::move(b.colour);
   }
+  const uint64_t filled = braids ? 0 : fillInvalid(all);
+  if (filled > 0 && options.notes)
+    options.notes->push_back(
+        fmt::format("{}: {} pixels are not finite: they have no weight and are filled from the "
+                    "other half or their neighbours",
+                    path, filled));
   for (Estimate& e : all.estimates)
     if (e.unbiased) varianceFromHalves(e, path, options.notes);
+  if (options.derive && !braids && first.unbiased) deriveStatistics(all, path, options.notes);
   if (options.notes && !complete(first.half))
     options.notes->push_back(fmt::format(
         "{}: no halves of {}: give two renders with different seeds as A.exr,B.exr for methods that need them", path,

@@ -22,6 +22,13 @@ struct ReadOptions {
   ImageRole role = ImageRole::Noisy;
   uint64_t samplesPerPixel = 0;               // where the file does not say; 0: unknown
   std::vector<std::string>* notes = nullptr;  // gets one line for everything that is missing or assumed
+  std::string layer{};                        // of a file of another renderer, see readForeign()
+  // Works out what the first estimate of another renderer lacks of variance and halves (combiners/spatial_variance.h);
+  // the attributes of the estimates say so.
+  bool derive = false;
+  Plane<float>* alpha = nullptr;    // gets the alpha channel that goes with the image, if there is one
+  ImageFile* head = nullptr;        // gets the header of the first file
+  const ImageFile* like = nullptr;  // a header of the same view, or else the files are refused
 };
 
 // A file of braid: every layer <name>.mean with its halves, quarters, variances, bias and earlier variances, the
@@ -35,8 +42,10 @@ struct ReadOptions {
 Estimates readEstimates(const ImageFile& file, const ReadOptions& options = {});
 
 // Estimates by an option such as --unbiased: FILE; or HALFA,HALFB, whose mean is the image; or IMAGE,HALFA,HALFB. FILE
-// may be FILE:NAME for one of the estimates in a file of braid, which then is the first. Variances that are missing are
-// taken from the halves, (A - B)²/4. Throws Error(BadInput).
+// may be FILE:NAME for one of the estimates in a file of braid, which then is the first, or for a layer of another
+// renderer's. Variances that are missing are taken from the halves, (A - B)²/4. Invalid pixels of other renderers are
+// filled (combiners/invalid_pixels.h). Throws Error(BadInput), also for halves that are the same pixels or of the same
+// seed, and for files of different views.
 Estimates readEstimatesOption(const std::string& text, const ReadOptions& options);
 
 }  // namespace braid

@@ -71,10 +71,87 @@ std::string colourLayer(const ImageFile& file, const Names& layers, bool denoise
   return "";
 }
 
-// pbrt: samplesPerPixel; Cycles: cycles.<Layer>.samples, as text.
-uint64_t samplesOf(const ImageFile& file) {
+// Names of Cycles' view layers, which have passes that are images: those with features first, Blender's compositor
+// last.
+Names viewLayersOf(const Names& layers) {
+  Names views;
+  for (const std::string& layer : layers) {
+    const std::string name = lower(lastPart(layer));
+    const size_t dot = layer.rfind('.');
+    if (dot == std::string::npos || (name != "combined" && name != "noisy image")) continue;
+    if (const std::string view = layer.substr(0, dot); std::find(views.begin(), views.end(), view) == views.end())
+      views.push_back(view);
+  }
+  const auto rank = [&](const std::string& view) {
+    const bool features = std::any_of(layers.begin(), layers.end(), [&](const std::string& layer) {
+      return lower(layer) == lower(view) + ".denoising albedo";
+    });
+    return features ? 0 : lower(view) == "composite" ? 2 : 1;
+  };
+  std::stable_sort(views.begin(), views.end(),
+                   [&](const std::string& a, const std::string& b) { return rank(a) < rank(b); });
+  return views;
+}
+
+std::string joined(const Names& names) {
+  std::string text;
+  for (const std::string& name : names) text += fmt::format("{}'{}'", text.empty() ? "" : ", ", name);
+  return text;
+}
+
+// The layers of a view layer.
+Names within(const Names& layers, const std::string& view) {
+  Names list;
+  for (const std::string& layer : layers)
+    if (layer.rfind(view + ".", 0) == 0) list.push_back(layer);
+  return list;
+}
+
+struct ChosenLayers {
+  std::string colour;
+  Names all;  // among which the features are
+};
+
+// Without a choice: the first view layer, or what colourLayer() finds.
+ChosenLayers chooseLayers(const ImageFile& file, bool denoised, const std::string& wanted,
+                          std::vector<std::string>& notes) {
+  const Names all = layersOf(file), views = viewLayersOf(all);
+  const bool noisy = findLayer(file, all, {"noisy image"}, "RGB") != nullptr;
+  if (wanted.empty() && !views.empty() && (!hasLayer(file, "") || (noisy && !denoised))) {
+    const ChosenLayers chosen = chooseLayers(file, denoised, views.front(), notes);
+    Names others(views.begin() + 1, views.end());
+    notes.push_back(fmt::format("{}: reads '{}'{}", file.path, chosen.colour,
+                                others.empty() ? ""
+                                               : fmt::format("; its other view layers are {}: choose one by {}:LAYER",
+                                                             joined(others), file.path)));
+    return chosen;
+  }
+  if (wanted.empty()) return {colourLayer(file, all, denoised), all};
+  if (std::find(views.begin(), views.end(), wanted) != views.end()) {
+    const Names own = within(all, wanted);
+    const std::string* before = findLayer(file, own, {"noisy image"}, "RGB");
+    const std::string* after = findLayer(file, own, {"combined"}, "RGB");
+    const std::string* colour = (denoised && after) || !before ? after : before;
+    if (colour) return {*colour, own};
+  }
+  if (hasChannels(file, wanted, "RGB")) {
+    const size_t dot = wanted.rfind('.');
+    const Names own = dot == std::string::npos ? Names() : within(all, wanted.substr(0, dot));
+    return {wanted, own.empty() ? all : own};
+  }
+  Names colours = views;
+  for (const std::string& layer : all)
+    if (!layer.empty() && hasChannels(file, layer, "RGB")) colours.push_back(layer);
+  throw Error(ExitCode::BadInput, fmt::format("{}: no layer '{}'{}", file.path, wanted,
+                                              colours.empty() ? std::string("; it has no layers with names")
+                                                              : "; it has " + joined(colours)));
+}
+
+// pbrt: samplesPerPixel; Cycles: cycles.<Layer>.samples, as text, of the layer that is read.
+uint64_t samplesOf(const ImageFile& file, const std::string& colour) {
+  const std::string cycles = "cycles." + colour.substr(0, colour.rfind('.')) + ".samples";
   for (const Attribute& a : file.attributes) {
-    if (a.name != "samplesPerPixel" && !(a.name.rfind("cycles.", 0) == 0 && a.name.ends_with(".samples"))) continue;
+    if (a.name != "samplesPerPixel" && a.name != cycles) continue;
     const int64_t n = a.kind == Attribute::Kind::Int ? a.integer : std::atoll(a.text.c_str());
     if (n > 0) return static_cast<uint64_t>(n);
   }
@@ -100,7 +177,7 @@ Rgb<float> varianceOfMean(const ImageFile& file, const std::string& colour, cons
 }
 
 // Depth, or else the distance of positions in camera space.
-Plane<float> readDepth(const ImageFile& file, const Names& layers) {
+Plane<float> anyDepth(const ImageFile& file, const Names& layers) {
   for (const char* component : {"Z", "V", "T", "R"})
     if (const std::string* layer = findLayer(file, layers, kDepth, component))
       return file.planes.at(*layer + "." + component);
@@ -111,6 +188,15 @@ Plane<float> readDepth(const ImageFile& file, const Names& layers) {
   const Rgb<float> p = file.rgb(*position);
   Plane<float> depth(file.width, file.height);
   for (size_t i = 0; i < depth.size(); ++i) depth[i] = glm::length(p.pixel(i));
+  return depth;
+}
+
+// What other renderers write where a camera ray meets nothing is 0, as braid's own.
+Plane<float> readDepth(const ImageFile& file, const Names& layers) {
+  constexpr float kNothing = 1e9f;
+  Plane<float> depth = anyDepth(file, layers);
+  for (float& d : depth.data)
+    if (d >= kNothing) d = 0;
   return depth;
 }
 
@@ -133,13 +219,15 @@ bool completeFeatures(Features& f, int width, int height) {
   return true;
 }
 
-ForeignImage readForeign(const ImageFile& file, bool denoised, uint64_t samplesPerPixel) {
+ForeignImage readForeign(const ImageFile& file, bool denoised, uint64_t samplesPerPixel, const std::string& layer) {
   ForeignImage out;
-  const Names layers = layersOf(file);
   const auto note = [&](const std::string& text) { out.notes.push_back(file.path + ": " + text); };
-  const std::string colour = colourLayer(file, layers, denoised);
+  const auto [colour, layers] = chooseLayers(file, denoised, layer, out.notes);
   out.estimate.mean = file.rgb(colour);
-  out.estimate.passes = samplesOf(file) > 0 ? samplesOf(file) : samplesPerPixel;
+  const uint64_t told = samplesOf(file, colour);
+  out.estimate.passes = told > 0 ? told : samplesPerPixel;
+  if (const auto alpha = file.planes.find(colour.empty() ? "A" : colour + ".A"); alpha != file.planes.end())
+    out.alpha = alpha->second;
   if (!denoised) {
     out.estimate.variance = varianceOfMean(file, colour, out.estimate.mean, out.estimate.passes);
     const bool perSample = hasLayer(file, "Variance") || hasLayer(file, "m2_" + colour);

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Variance and halves for images that come without: one image of another renderer, of which nothing else is known.
+// Neither is as good as what a render can tell of itself.
+#pragma once
+
+#include "renderer/film/estimates.h"
+
+namespace braid {
+
+// An estimate of the variance of an image from the differences of its neighbouring pixels, which have to be
+// independent: a box filter, or one that shares no samples between pixels.
+//
+// Second differences x0 - (x1 + x2) / 2 in four directions vanish on slopes; along an edge one of the directions sees
+// noise alone, so the least of them counts. Averaged over 9 x 9 pixels by their square roots, so that single fireflies
+// do not count as the noise of what surrounds them; a pixel that stands out keeps its own difference. Albedos are
+// divided out, and differences across edges of features are left out. Finite, >= 0, in the units of image².
+Rgb<float> spatialVariance(const Rgb<float>& image, const Features* features);
+
+// Two halves of an estimate with a mean and a variance: mean ± the same normal noise of that variance. They have the
+// variance of halves, twice that of the mean; their mean is the mean; and for normal noise of known variance they are
+// independent of each other (data fission, Leiner et al. 2023). `seed` chooses the noise; the channels of a pixel share
+// it, as those of path tracing nearly do.
+void makeHalves(Estimate& estimate, uint64_t seed = 0);
+
+}  // namespace braid
