@@ -13,6 +13,7 @@
 #include "combiners/outside_method.h"
 #include "combiners/registry.h"
 #include "renderer/core/error.h"
+#include "renderer/core/hash.h"
 
 namespace braid {
 
@@ -389,9 +390,17 @@ std::vector<OptionInfo> allMethodOptions() {
 std::string layerName(const std::string& name) {
   const size_t colon = name.find(':');
   std::string text = name.substr(0, colon);
-  if (colon != std::string::npos)
-    text.append("-").append(
-        std::filesystem::path(name.substr(colon + 1, name.find(':', colon + 1) - colon - 1)).stem().string());
+  if (colon != std::string::npos) {
+    std::string file = name.substr(colon + 1, name.find(':', colon + 1) - colon - 1), more;
+    if (text.ends_with("external-command")) {  // the program, and what tells commands of one program apart
+      ContentHash hash;
+      hash.add(name);
+      file = file.substr(file.find_first_not_of("' "));
+      file = file.substr(0, file.find_first_of("' "));
+      more = "-" + hexString(hash.value()).substr(0, 4);
+    }
+    text.append("-").append(std::filesystem::path(file).stem().string()).append(more);
+  }
   std::replace(text.begin(), text.end(), '.', '-');
   return text;
 }

@@ -109,7 +109,8 @@ std::shared_ptr<const Method> findMethod(const std::string& name);
 // The options of every registered method, each once.
 std::vector<OptionInfo> allMethodOptions();
 
-// A name for layers of files: what follows a colon is shortened to the stem of a file name, and no dots.
+// A name for layers of files: what follows a colon is shortened to the stem of a file name, a command to its
+// program and four digits of its hash, and no dots.
 std::string layerName(const std::string& name);
 
 }  // namespace braid

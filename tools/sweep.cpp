@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <tuple>
 
 #include <fmt/format.h>
@@ -32,6 +33,14 @@ void makeFolder(const std::string& path) {
   std::error_code failure;
   fs::create_directories(path, failure);
   if (failure) throw Error(ExitCode::OutputFailed, fmt::format("{}: cannot be created: {}", path, failure.message()));
+}
+
+// Whether the method or an input of it is the fixed image of a file: external:FILE.
+bool readsFile(const std::string& method) {
+  const std::string name = "external:";
+  for (size_t at = method.find(name); at != std::string::npos; at = method.find(name, at + 1))
+    if (at == 0 || std::string("@+/").find(method[at - 1]) != std::string::npos) return true;
+  return false;
 }
 
 class Sweep {
@@ -63,6 +72,8 @@ class Sweep {
   void sortRows();
   void finish(std::ostream& out);
   void warn(const std::string& text);
+  // Says which cells failed and which methods never ran; whether there were any.
+  bool reportFailures() const;
 
   std::string path(const char* name) const { return o_.output + "/" + name; }
 
@@ -76,6 +87,8 @@ class Sweep {
   SweepTable table_;
   Json record_;
   SweepProgress progress_;
+  std::vector<std::string> failures_;             // a line for each cell that was tried and failed
+  std::map<std::string, std::string> obstacles_;  // by method, the last one
   const std::atomic<bool>& interrupted_;
 };
 
@@ -108,6 +121,17 @@ void Sweep::checkInputs() const {
     throw Error(ExitCode::Usage, "--seed: below 2^63; references use the seeds from there on");
   if (!(o_.cropWorst >= 0 && o_.cropWorst < 1))
     throw Error(ExitCode::Usage, "--crop-worst: a fraction of the pixels, from 0 to below 1");
+  size_t rungs = 0;
+  for (const LadderRungs& l : ladders_) rungs += l.rungs.size();
+  for (const SweepMethod& method : methods_)
+    if (readsFile(method.name) && (rungs > 1 || o_.scenes.size() > 1))
+      throw Error(
+          ExitCode::Usage,
+          fmt::format("--methods: {}: one image cannot stand for {}: it would be compared everywhere as if it had "
+                      "been made there; give one scene and one rung, or external-command:'COMMAND {{color}} "
+                      "{{albedo}} {{normal}} {{out}}'",
+                      method.name,
+                      rungs > 1 ? fmt::format("{} rungs", rungs) : fmt::format("{} scenes", o_.scenes.size())));
   for (const std::string& file : o_.scenes)
     if (!fs::exists(file)) throw Error(ExitCode::BadInput, file + ": no such file");
   for (const auto* list : {&o_.references, &o_.referenceIntegrators})
@@ -282,6 +306,13 @@ bool Sweep::runJob(const SweepScene& scene, const SweepJob& job) {
   callbacks.onRow = [&](const SweepRow& row, const Rgb<float>& image) { keepRow(row, image); };
   callbacks.onObstacle = [&](const SweepMethod& method, const std::string& obstacle) {
     warn(fmt::format("{}: {} did not run: {}", scene.name, method.name, obstacle));
+    obstacles_[method.name] = obstacle;
+  };
+  callbacks.onFailure = [&](const SweepRow& row, const std::string& obstacle) {
+    failures_.push_back(fmt::format("{}, {} at {} {}, seed {}: {}", row.scene, row.method, row.mark,
+                                    row.ladder == Ladder::Samples ? "samples" : "seconds", row.seed, obstacle));
+    warn(failures_.back());
+    obstacles_[row.method] = obstacle;
   };
   callbacks.onRound = [&](uint64_t rounds, double done) {
     const std::string detail = samples ? fmt::format("{}/{} spp", rounds, job.lastMark())
@@ -395,6 +426,24 @@ void Sweep::warn(const std::string& text) {
   if (!o_.quiet) fmt::print(stderr, "warning: {}\n", text);
 }
 
+bool Sweep::reportFailures() const {
+  if (!failures_.empty())
+    fmt::print(stderr, "{} cells failed and have no rows; the same command tries them again; the last: {}\n",
+               failures_.size(), failures_.back());
+  bool all = true;
+  for (const SweepMethod& method : methods_) {
+    const bool ran = std::any_of(table_.rows.begin(), table_.rows.end(), [&](const SweepRow& row) {
+      return row.method == method.name && !row.values.empty() && !std::isnan(row.values.front());
+    });
+    if (ran) continue;
+    const auto obstacle = obstacles_.find(method.name);
+    fmt::print(stderr, "{} never ran: {}\n", method.name,
+               obstacle == obstacles_.end() ? "its rows have no values" : obstacle->second);
+    all = false;
+  }
+  return !all || !failures_.empty();
+}
+
 int Sweep::run(std::ostream& out) {
   checkInputs();
   openFolder();
@@ -405,7 +454,7 @@ int Sweep::run(std::ostream& out) {
     if (!jobs.empty()) completed = runScene(i, jobs);
   }
   finish(out);
-  if (completed) return 0;
+  if (completed) return reportFailures() ? static_cast<int>(ExitCode::BadInput) : 0;
   fmt::print(stderr, "interrupted: the same command goes on where it stopped\n");
   return static_cast<int>(ExitCode::Interrupted);
 }
@@ -420,7 +469,9 @@ int runSweep(const SweepOptions& options, const std::vector<SweepMethod>& method
 int runSweep(const SweepOptions& options, std::ostream& out) {
   const auto integrators = makeIntegrators();
   const std::vector<const Integrator*> pointers = pointersTo(integrators);
-  return runSweep(options, sweepMethods(options.methods, pointers), pointers, out);
+  MethodOptions numbers;
+  numbers.set("external-command-timeout", options.commandTimeout);
+  return runSweep(options, sweepMethods(options.methods, pointers, numbers), pointers, out);
 }
 
 }  // namespace braid

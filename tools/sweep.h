@@ -31,6 +31,7 @@ struct SweepOptions {
   std::string size = "640x360", sampler = "sobol", isa = "avx2";
   int maxDepth = 32, threads = 0;
   double cropWorst = 0.001;
+  double commandTimeout = 600;  // seconds that one run of an external command may take
   bool noPlots = false, quiet = false;
 };
 
@@ -45,8 +46,8 @@ std::vector<std::string> sceneNames(const std::vector<std::string>& files);
 // The value of a list of VALUE and SCENE=VALUE items for one scene; `fallback` where there is none.
 std::string valueForScene(const std::vector<std::string>& list, const std::string& scene, const std::string& fallback);
 
-// Runs the sweep with every registered method; the summary goes to `out`. Returns the exit code: 0, or 130 when
-// interrupted, after writing everything that is known. Throws Error.
+// Runs the sweep with every registered method; the summary goes to `out`. Returns the exit code: 0, 2 when a cell failed
+// or a method never ran, or 130 when interrupted, after writing everything that is known. Throws Error.
 int runSweep(const SweepOptions& options, std::ostream& out);
 // The same for these methods, which `options.methods` is not looked at for.
 int runSweep(const SweepOptions& options, const std::vector<SweepMethod>& methods,

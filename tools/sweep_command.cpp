@@ -44,6 +44,9 @@ void addSweep(CLI::App& app, Action& action) {
   c->add_option("--crop-worst", o.cropWorst, "Fraction of the pixels, the worst, left out of relL2_trimmed")
       ->capture_default_str();
   c->add_option("--isa", o.isa, "Instruction set for Embree: avx2, avx512, sse4.2, or 'auto'")->capture_default_str();
+  c->add_option("--external-command-timeout", o.commandTimeout, "Seconds after which an external command is ended")
+      ->capture_default_str()
+      ->check(CLI::Range(0.01, 1e6));
   c->add_flag("--no-plots", o.noPlots, "Do not run gnuplot");
   c->add_flag("-q,--quiet", o.quiet, "Errors only");
   c->footer(
@@ -52,6 +55,8 @@ void addSweep(CLI::App& app, Action& action) {
       "  braid sweep scenes/cornell.glb -o out --spp 4:1024 --methods pt --seeds 4\n"
       "  braid sweep scenes/*.glb -o out --time 1:32 --methods pt,bdpt --reference-spp 32768 \\\n"
       "      --reference-integrator pt,pool=bdpt\n"
+      "  braid sweep scenes/cornell.glb -o out --spp 8:64 \\\n"
+      "      --methods \"pt,external-command:my_denoiser {color} {albedo} {normal} {out}\"\n"
       "  braid sweep --preset papers scenes/*.glb -o papers");
   c->callback([options, c, &action] {
     std::set<std::string> given;

@@ -24,6 +24,7 @@ struct MethodImage {
   Rgb<float> image;  // empty when it could not run
   double denoiseSeconds = 0, combineSeconds = 0;
   std::string obstacle;         // why it could not
+  bool failed = false;          // it was run and failed, as another denoiser's program may
   std::optional<double> error;  // estimated by the method itself, as relativeError(); none where it says nothing
 };
 

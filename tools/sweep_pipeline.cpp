@@ -36,8 +36,10 @@ EstimateFacts factsOf(const Integrator& integrator) {
 // Runs all methods of the same inputs when the first of them is asked about a snapshot.
 class SharedPipeline {
  public:
-  SharedPipeline(std::vector<MethodShare> inputs, std::string unbiased) : inputs_(std::move(inputs)) {
+  SharedPipeline(std::vector<MethodShare> inputs, std::string unbiased, const MethodOptions& numbers)
+      : inputs_(std::move(inputs)) {
     options_.roles.unbiased = std::move(unbiased);
+    options_.numbers = numbers;
   }
   const std::vector<MethodShare>& inputs() const { return inputs_; }
   void want(const std::string& method) { wanted_.push_back(method); }
@@ -49,6 +51,7 @@ class SharedPipeline {
     MethodImage made;
     if (!output || !output->ran()) {
       made.obstacle = output ? output->step.obstacle : "did not run";
+      made.failed = output && output->failed;
       return made;
     }
     made.image = output->result.image.mean;
@@ -159,7 +162,8 @@ Parsed parse(const std::string& name, const Integrators& integrators) {
 
 }  // namespace
 
-std::vector<SweepMethod> sweepMethods(const std::vector<std::string>& names, const Integrators& integrators) {
+std::vector<SweepMethod> sweepMethods(const std::vector<std::string>& names, const Integrators& integrators,
+                                      const MethodOptions& numbers) {
   const std::vector<SweepMethod> plain = integratorMethods(integrators);
   std::vector<SweepMethod> known = plain;
   std::vector<std::shared_ptr<SharedPipeline>> pipelines;
@@ -169,8 +173,8 @@ std::vector<SweepMethod> sweepMethods(const std::vector<std::string>& names, con
     auto found =
         std::find_if(pipelines.begin(), pipelines.end(), [&](const auto& p) { return p->inputs() == parsed.inputs; });
     if (found == pipelines.end())
-      found =
-          pipelines.insert(found, std::make_shared<SharedPipeline>(parsed.inputs, parsed.inputs.front().integrator));
+      found = pipelines.insert(
+          found, std::make_shared<SharedPipeline>(parsed.inputs, parsed.inputs.front().integrator, numbers));
     const std::shared_ptr<SharedPipeline> pipeline = *found;
     pipeline->want(parsed.method);
     SweepMethod method;

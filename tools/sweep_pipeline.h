@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "renderer/film/combiner.h"
 #include "tools/sweep_method.h"
 
 namespace braid {
@@ -14,8 +15,9 @@ namespace braid {
 // several, of which the first is improved: bdpt+sppm/auto. An integrator after '@' is rendered too, and the first
 // registered one with correlated pixels for methods that need it. Methods of the same inputs run together, so that each
 // denoiser runs once a snapshot; their seconds still count it for every method that reads it. Throws Error(Usage)
-// naming unknown names and what keeps a method from running.
+// naming unknown names and what keeps a method from running. `numbers` are values of the methods' options.
 std::vector<SweepMethod> sweepMethods(const std::vector<std::string>& names,
-                                      const std::vector<const Integrator*>& integrators);
+                                      const std::vector<const Integrator*>& integrators,
+                                      const MethodOptions& numbers = {});
 
 }  // namespace braid

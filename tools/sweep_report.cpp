@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "renderer/core/hash.h"
 #include "renderer/core/error.h"
 #include "renderer/film/exr.h"
 #include "tools/report/html.h"
@@ -26,7 +27,11 @@ using Json = nlohmann::ordered_json;
 std::string fileName(std::string text) {
   for (char& c : text)
     if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '_' && c != '-') c = '_';
-  return text;
+  constexpr size_t kLongest = 80;  // file systems end names at 255
+  if (text.size() <= kLongest) return text;
+  ContentHash hash;
+  hash.add(text);
+  return text.substr(0, kLongest) + "-" + hexString(hash.value());
 }
 
 std::string readText(const std::string& path) {

@@ -55,6 +55,10 @@ void evaluate(const SweepScene& scene, const SweepJob& job, const SweepJob::Cell
   }
   row.denoise = made.denoiseSeconds;
   row.combine = made.combineSeconds;
+  if (made.failed) {
+    if (callbacks.onFailure) callbacks.onFailure(row, made.obstacle);
+    return;
+  }
   if (made.image.empty()) {
     row.values.assign(measurement.columns().size(), std::numeric_limits<double>::quiet_NaN());
     if (callbacks.onObstacle) callbacks.onObstacle(method, made.obstacle);

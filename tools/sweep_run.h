@@ -67,6 +67,8 @@ struct SweepCallbacks {
   // A method that could not run on so few samples has a row without values and an empty image.
   std::function<void(const SweepRow&, const Rgb<float>& image)> onRow;
   std::function<void(const SweepMethod&, const std::string& obstacle)> onObstacle;
+  // A method that was run and failed has no row, so that the next run of the sweep tries it again.
+  std::function<void(const SweepRow&, const std::string& obstacle)> onFailure;
   // Rounds done and render seconds so far, without the time spent on denoising and measuring.
   std::function<void(uint64_t rounds, double seconds)> onRound;
   const std::atomic<bool>* cancel = nullptr;

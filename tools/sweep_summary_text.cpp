@@ -36,6 +36,12 @@ const char* kindName(TimeToError::Kind kind) {
                                             : "beforeFirstRung";
 }
 
+// Commands may have pipes.
+std::string cellText(std::string text) {
+  for (size_t at = text.find('|'); at != std::string::npos; at = text.find('|', at + 2)) text.insert(at, "\\");
+  return text;
+}
+
 }  // namespace
 
 std::string shortNumber(double v) {
@@ -61,12 +67,12 @@ std::string toMarkdown(const SweepSummary& s) {
   text +=
       fmt::format("| scene | method | equal time | error | error ratio | time ratio |\n|---|---|--:|--:|--:|--:|\n");
   for (const MethodSummary& m : s.cells)
-    text += fmt::format("| {} | {} | {} s | {} | {} | {} |\n", m.scene, m.method, shortNumber(m.equalTime),
+    text += fmt::format("| {} | {} | {} s | {} | {} | {} |\n", m.scene, cellText(m.method), shortNumber(m.equalTime),
                         shortNumber(m.error), shortNumber(m.errorRatio), shortRatio(m.toBaseline));
   text += "\nGeometric means over scenes; score: mean of n (best of n) to 1 (worst) over scenes and rungs.\n\n";
   text += "| method | error ratio | time ratio | score |\n|---|--:|--:|--:|\n";
   for (const OverallSummary& o : s.overall)
-    text += fmt::format("| {} | {}{} | {}{} | {:.2f} |\n", o.method, shortNumber(o.errorRatio),
+    text += fmt::format("| {} | {}{} | {}{} | {:.2f} |\n", cellText(o.method), shortNumber(o.errorRatio),
                         describeScenes(o.errorScenes, s.scenes.size()), shortNumber(o.timeRatio),
                         describeScenes(o.timeScenes, s.scenes.size()), o.score);
   return text;
