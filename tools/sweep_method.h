@@ -24,8 +24,8 @@ struct MethodImage {
   Rgb<float> image;  // empty when it could not run
   double denoiseSeconds = 0, combineSeconds = 0;
   std::string obstacle;         // why it could not
-  bool failed = false;          // it was run and failed, as another denoiser's program may
   std::optional<double> error;  // estimated by the method itself, as relativeError(); none where it says nothing
+  bool failed = false;          // it was run and failed, as another denoiser's program may
 };
 
 // A method. Without `finish` it is an integrator, and its image is the mean of its only input. The estimates that
