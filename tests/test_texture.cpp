@@ -8,6 +8,7 @@
 #include <doctest/doctest.h>
 #include <OpenImageIO/imageio.h>
 #include <unistd.h>
+#include <webp/encode.h>
 
 #include "renderer/core/error.h"
 #include "renderer/scene/texture.h"
@@ -203,6 +204,108 @@ TEST_CASE("texture: JPEG and WebP") {
     CHECK(std::abs(image->bytes[0] - 60) < 8);
     CHECK(std::abs(image->bytes[2] - 180) < 8);
   }
+}
+
+namespace {
+
+// Two texels, (200,100,50) of alpha 64 and (10,20,30) of alpha 0.
+const std::vector<uint8_t> kTwoTexels{200, 100, 50, 64, 10, 20, 30, 0};
+
+// Those of a file, as bytes.
+std::vector<int> texelsOf(const std::vector<uint8_t>& file) {
+  const auto image = decodeImage(file.data(), file.size(), "x");
+  REQUIRE(image->width == 2);
+  std::vector<int> texels(image->bytes.begin(), image->bytes.end());
+  for (const float v : image->floats) texels.push_back(static_cast<int>(std::lround(v * 255)));
+  return texels;
+}
+
+std::vector<uint8_t> webpOf(const std::vector<uint8_t>& rgba, int width, int height, float quality) {
+  WebPConfig config;
+  WebPPicture picture;
+  REQUIRE(WebPConfigInit(&config));
+  REQUIRE(WebPPictureInit(&picture));
+  config.lossless = quality < 0;
+  config.exact = 1;  // keeps colours under alpha 0
+  if (quality >= 0) config.quality = quality;
+  picture.use_argb = config.lossless;
+  picture.width = width;
+  picture.height = height;
+  WebPMemoryWriter writer;
+  WebPMemoryWriterInit(&writer);
+  picture.writer = WebPMemoryWrite;
+  picture.custom_ptr = &writer;
+  REQUIRE(WebPPictureImportRGBA(&picture, rgba.data(), width * 4));
+  REQUIRE(WebPEncode(&config, &picture));
+  std::vector<uint8_t> bytes(writer.mem, writer.mem + writer.size);
+  WebPMemoryWriterClear(&writer);
+  WebPPictureFree(&picture);
+  return bytes;
+}
+
+}  // namespace
+
+TEST_CASE("texture: colours are not multiplied by alpha, in any format") {
+  const std::vector<int> stored(kTwoTexels.begin(), kTwoTexels.end());
+  OIIO::ImageSpec spec(2, 1, 4, OIIO::TypeDesc::UINT8);
+  CHECK(texelsOf(encoded(".png", spec, OIIO::TypeDesc::UINT8, kTwoTexels.data())) == stored);
+  CHECK(texelsOf(encoded(".tif", spec, OIIO::TypeDesc::UINT8, kTwoTexels.data())) == stored);
+  CHECK(texelsOf(webpOf(kTwoTexels, 2, 1, -1)) == stored);
+  spec.set_format(OIIO::TypeDesc::UINT16);
+  CHECK(texelsOf(encoded(".png", spec, OIIO::TypeDesc::UINT8, kTwoTexels.data())) == stored);
+
+  // The same as a palette with a tRNS chunk.
+  const std::vector<uint8_t> palette{
+      0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49, 0x48, 0x44, 0x52, 0x00,
+      0x00, 0x00, 0x02, 0x00, 0x00, 0x00, 0x01, 0x08, 0x03, 0x00, 0x00, 0x00, 0xc3, 0xfc, 0x8f, 0xb8, 0x00,
+      0x00, 0x00, 0x06, 0x50, 0x4c, 0x54, 0x45, 0xc8, 0x64, 0x32, 0x0a, 0x14, 0x1e, 0xb7, 0x7a, 0xab, 0x51,
+      0x00, 0x00, 0x00, 0x02, 0x74, 0x52, 0x4e, 0x53, 0x40, 0x00, 0x86, 0xea, 0x82, 0x3d, 0x00, 0x00, 0x00,
+      0x0b, 0x49, 0x44, 0x41, 0x54, 0x78, 0x9c, 0x63, 0x60, 0x60, 0x04, 0x00, 0x00, 0x04, 0x00, 0x02, 0xbf,
+      0x7a, 0x3f, 0x4a, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82};
+  CHECK(texelsOf(palette) == stored);
+
+  // Grey with alpha.
+  OIIO::ImageSpec greySpec(2, 1, 2, OIIO::TypeDesc::UINT8);
+  greySpec.channelnames = {"Y", "A"};
+  greySpec.alpha_channel = 1;
+  const uint8_t greys[4] = {200, 64, 10, 0};
+  CHECK(texelsOf(encoded(".png", greySpec, OIIO::TypeDesc::UINT8, greys)) == std::vector<int>{200, 64, 10, 0});
+
+  // Formats that store products: what is under alpha 0 is lost in them.
+  const float products[8] = {0.8f * 0.25f, 0.4f * 0.25f, 2 * 0.25f, 0.25f, 0, 0, 0, 0};
+  const auto exr = encoded(".exr", OIIO::ImageSpec(2, 1, 4, OIIO::TypeDesc::FLOAT), OIIO::TypeDesc::FLOAT, products);
+  const auto floats = decodeImage(exr.data(), exr.size(), "x")->floats;
+  REQUIRE(floats.size() == 8);
+  for (size_t c = 0; c < 3; ++c) CHECK(floats[c] == doctest::Approx(4 * products[c]));
+  CHECK(floats[3] == 0.25f);
+}
+
+TEST_CASE("texture: lossy WebP, WebP without alpha, and broken WebP") {
+  std::vector<uint8_t> plain;
+  for (int i = 0; i < 16 * 16; ++i) plain.insert(plain.end(), {200, 100, 50, 255});
+  const std::vector<uint8_t> opaque = webpOf(plain, 16, 16, -1);
+  const auto three = decodeImage(opaque.data(), opaque.size(), "x");
+  CHECK(three->channels == 3);
+  CHECK(three->bytes[3 * 17 + 1] == 100);
+
+  std::vector<uint8_t> veiled = plain;
+  for (size_t i = 3; i < veiled.size(); i += 4) veiled[i] = 64;
+  const std::vector<uint8_t> lossy = webpOf(veiled, 16, 16, 90);
+  const auto image = decodeImage(lossy.data(), lossy.size(), "x");
+  REQUIRE(image->channels == 4);
+  CHECK(std::abs(image->bytes[0] - 200) < 8);
+  CHECK(std::abs(image->bytes[2] - 50) < 8);
+  CHECK(image->bytes[3] == 64);
+
+  const std::vector<uint8_t> cut(lossy.begin(), lossy.begin() + static_cast<ptrdiff_t>(lossy.size() / 2));
+  CHECK_THROWS_AS(decodeImage(cut.data(), cut.size(), "x"), Error);
+  CHECK_THROWS_AS(decodeImage(lossy.data(), 13, "x"), Error);
+
+  // 16383 x 16383 texels of one colour in a few bytes: refused before anything is allocated.
+  std::vector<uint8_t> bomb = opaque;
+  bomb[21] = 0xff, bomb[22] = bomb[23] = 0xff;
+  bomb[24] = static_cast<uint8_t>(bomb[24] | 0x0f);
+  CHECK_THROWS_WITH_AS(decodeImage(bomb.data(), bomb.size(), "x"), doctest::Contains("damaged"), Error);
 }
 
 TEST_CASE("texture: EXR texels that are not finite become 0") {

@@ -10,6 +10,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/image_limits.h"
+#include "renderer/scene/webp.h"
 
 namespace braid {
 
@@ -119,7 +120,6 @@ std::string formatName(const uint8_t* data, size_t bytes) {
   };
   if (begins("\x89PNG", 4)) return "image.png";
   if (begins("\xFF\xD8\xFF", 3)) return "image.jpg";
-  if (begins("RIFF", 4) && begins("WEBP", 4, 8)) return "image.webp";
   if (begins("#?", 2)) return "image.hdr";
   if (begins("\x76\x2f\x31\x01", 4)) return "image.exr";
   if (begins("II*\0", 4) || begins("MM\0*", 4)) return "image.tif";
@@ -167,24 +167,30 @@ int keptChannels(const OIIO::ImageSpec& spec) {
   return spec.nchannels;
 }
 
-void checkSize(const OIIO::ImageSpec& spec, uint64_t fileBytes) {
-  const std::string size = std::to_string(spec.width) + " x " + std::to_string(spec.height);
-  if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1) {
-    throw Error(ExitCode::BadInput, "is an image of " + size + " pixels; save it as a flat picture");
+// Formats whose alpha is associated by their rules, unless the reader says otherwise.
+bool isAssociated(const OIIO::ImageInput& input) {
+  const std::string format = input.format_name();
+  return (format == "openexr" || format == "tiff") && input.spec().get_int_attribute("oiio:UnassociatedAlpha") == 0;
+}
+
+void divideByAlpha(Image& image) {
+  const auto channels = static_cast<size_t>(image.channels);
+  for (size_t i = channels - 1; i < image.floats.size(); i += channels) {
+    const float alpha = image.floats[i];
+    for (size_t c = 1; c < channels && alpha > 0; ++c)
+      image.floats[i - c] = std::min(image.floats[i - c] / alpha, kLargestRadiance);
   }
-  if (static_cast<uint64_t>(spec.width) * static_cast<uint64_t>(spec.height) > kMaxPixels) {
-    throw Error(ExitCode::BadInput, "is an image of " + size + " pixels, more than 2^28; make it smaller");
-  }
-  const auto values = static_cast<uint64_t>(spec.image_pixels()) * static_cast<uint64_t>(spec.nchannels);
-  if (!canHold(fileBytes, values)) {
-    throw Error(ExitCode::BadInput, "claims " + size + " pixels in " + std::to_string(fileBytes) +
-                                        " bytes, which cannot be: it is damaged; save it again");
+  for (size_t i = channels - 1; i < image.bytes.size(); i += channels) {
+    const int alpha = image.bytes[i];
+    for (size_t c = 1; c < channels && alpha > 0; ++c)
+      image.bytes[i - c] = static_cast<uint8_t>(std::min(255, (image.bytes[i - c] * 255 + alpha / 2) / alpha));
   }
 }
 
-std::shared_ptr<const Image> readPixels(OIIO::ImageInput& input, const std::string& name, uint64_t fileBytes) {
+std::shared_ptr<Image> readPixels(OIIO::ImageInput& input, const std::string& name, uint64_t fileBytes) {
   const OIIO::ImageSpec spec = input.spec();
-  checkSize(spec, fileBytes);
+  if (spec.depth > 1) throw Error(ExitCode::BadInput, "is an image of several layers; save it as a flat picture");
+  checkImageSize(spec.width, spec.height, spec.nchannels, fileBytes);
   auto image = std::make_shared<Image>();
   image->name = name;
   image->width = spec.width;
@@ -214,6 +220,19 @@ std::shared_ptr<const Image> readPixels(OIIO::ImageInput& input, const std::stri
 }
 
 }  // namespace
+
+void checkImageSize(int width, int height, int channels, uint64_t fileBytes) {
+  const std::string size = std::to_string(width) + " x " + std::to_string(height);
+  if (width < 1 || height < 1 || channels < 1)
+    throw Error(ExitCode::BadInput, "is an image of " + size + " pixels; save it as a flat picture");
+  const uint64_t pixels = static_cast<uint64_t>(width) * static_cast<uint64_t>(height);
+  if (pixels > kMaxPixels)
+    throw Error(ExitCode::BadInput, "is an image of " + size + " pixels, more than 2^28; make it smaller");
+  if (!canHold(fileBytes, pixels * static_cast<uint64_t>(channels))) {
+    throw Error(ExitCode::BadInput, "claims " + size + " pixels in " + std::to_string(fileBytes) +
+                                        " bytes, which cannot be: it is damaged; save it again");
+  }
+}
 
 Texture::Texture(std::shared_ptr<const Image> image, bool srgb, Wrap wrapU, Wrap wrapV, Filter filter)
     : image_(std::move(image)), srgb_(srgb), wrapU_(wrapU), wrapV_(wrapV), filter_(filter) {
@@ -289,16 +308,34 @@ size_t Texture::bytes() const { return image_ ? image_->bytes.size() + image_->f
 
 std::shared_ptr<const Image> decodeImage(const uint8_t* data, size_t bytes, const std::string& name) {
   if (bytes == 0) throw Error(ExitCode::BadInput, "is an empty image; save it again");
+  if (isWebp(data, bytes)) return decodeWebp(data, bytes, name);
   const std::string format = formatName(data, bytes);
   BoundedReader reader(data, bytes);
   const InputPointer input = openInput(format, &reader);
-  return readPixels(*input, name, bytes);
+  const std::shared_ptr<Image> image = readPixels(*input, name, bytes);
+  if (image->hasAlpha() && isAssociated(*input)) divideByAlpha(*image);
+  return image;
 }
+
+namespace {
+
+bool beginsAsWebp(const std::string& path) {
+  std::array<uint8_t, 12> first{};
+  return OIIO::Filesystem::read_bytes(path, first.data(), first.size()) == first.size() &&
+         isWebp(first.data(), first.size());
+}
+
+}  // namespace
 
 std::shared_ptr<const Image> readImageFile(const std::string& path) {
   if (!OIIO::Filesystem::is_regular(path))
     throw Error(ExitCode::BadInput, path + ": is not a file that can be read; check the path");
   try {
+    if (std::string file; beginsAsWebp(path)) {
+      if (!OIIO::Filesystem::read_text_file(path, file))
+        throw Error(ExitCode::BadInput, "cannot be read; check its permissions");
+      return decodeWebp(reinterpret_cast<const uint8_t*>(file.data()), file.size(), path);
+    }
     const InputPointer input = openInput(path, nullptr);
     return readPixels(*input, path, OIIO::Filesystem::file_size(path));
   } catch (const Error& error) {

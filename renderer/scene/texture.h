@@ -62,11 +62,13 @@ class Texture {
   Filter filter_ = Filter::Linear;
 };
 
-// Decodes an encoded image (PNG, JPEG, WebP, HDR, EXR, …) held in memory by OpenImageIO. Colour profiles and gamma
-// chunks are ignored, as glTF demands. Throws Error(BadInput) with a one-line reason; refuses images over 2^28 pixels.
+// Decodes an encoded image (PNG, JPEG, WebP, HDR, EXR, …) held in memory, by OpenImageIO and libwebp, with unassociated
+// alpha: that of formats which store colours multiplied by it (EXR, some TIFF) is divided out. Colour profiles and
+// gamma chunks are ignored, as glTF demands. Throws Error(BadInput) with a one-line reason; refuses images over 2^28
+// pixels.
 std::shared_ptr<const Image> decodeImage(const uint8_t* data, size_t bytes, const std::string& name);
 
-// The same from a file.
+// The same from a file, for environments: colours stay multiplied by alpha where the file has them so.
 std::shared_ptr<const Image> readImageFile(const std::string& path);
 
 // Where a material reads a texture: which texture, which uv set, and KHR_texture_transform as a 2x3 matrix.
