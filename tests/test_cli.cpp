@@ -104,7 +104,8 @@ TEST_CASE("A photon map comes with its bias, and with an error map of variance a
   const Folder folder;
   const ImageFile file = rendered(folder, "--integrator sppm --spp 8");
   const std::set<std::string> names = channels(file);
-  for (const char* layer : {"sppm.mean.R", "sppm.bias.R", "sppm.biasA.R", "sppm.biasB.R", "sppm.biasVariance.R", "Error.Y"})
+  for (const char* layer :
+       {"sppm.mean.R", "sppm.bias.R", "sppm.biasA.R", "sppm.biasB.R", "sppm.biasVariance.R", "Error.Y"})
     CHECK_MESSAGE(names.count(layer), layer);
   Estimate estimate;
   estimate.mean = file.rgb("sppm.mean");
@@ -321,6 +322,35 @@ TEST_CASE("plan, info and the lists tell what there is") {
   CHECK(braidRun(folder, "--version").code == 0);
   for (const char* command : {"", "render", "plan", "info", "compare", "replay", "bench"})
     CHECK(braidRun(folder, std::string(command) + " --help").code == 0);
+}
+
+TEST_CASE("Animations are listed with their lengths, and chosen by name or index") {
+  const Folder folder;
+  test::GltfFile file = test::triangleFile();
+  const int times = file.accessor<float>({0, 0.5f, 2.25f}, "SCALAR");
+  const int moves = file.accessor<float>({0, 0, 0, 1, 0, 0, 2, 0, 0}, "VEC3");
+  for (const char* name : {"walk", "jump"})
+    file.root["animations"].push_back(
+        {{"name", name},
+         {"samplers", {{{"input", times}, {"output", moves}}}},
+         {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}}}});
+  folder.write("clips.glb", file.glb());
+  const Run info = braidRun(folder, "info clips.glb --json");
+  REQUIRE(info.code == 0);
+  const Json list = Json::parse(info.out)["animations"];
+  REQUIRE(list.size() == 2);
+  CHECK(list[1]["name"] == "jump");
+  CHECK(list[0]["seconds"] == 2.25);
+  CHECK(contains(braidRun(folder, "info clips.glb").out, "1 'jump', 2.25 s"));
+  const auto lowest = [&](const std::string& options) {
+    return Json::parse(braidRun(folder, "info clips.glb --json " + options).out)["bounds"]["min"][0].get<double>();
+  };
+  CHECK(lowest("--frame-time 0.5") == 1);
+  CHECK(lowest("--frame-time 2.25 --animation jump") == 2);
+  CHECK(lowest("--frame-time 2.25 --animation 1") == 2);
+  const Run unknown = braidRun(folder, "plan clips.glb --animation run");
+  CHECK(unknown.code == 1);
+  CHECK(contains(unknown.err, "the file has 0 'walk', 1 'jump'"));
 }
 
 TEST_CASE("A replayed path returns what the render stored") {

@@ -306,10 +306,11 @@ TEST_CASE("tangents: vertices split where texture space is mirrored") {
   mesh.positions = {{0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {-1, 0, 0}};
   mesh.normals.assign(4, Vec3(0, 0, 1));
   mesh.triangles = {{0, 2, 1}, {0, 1, 3}};
-  const std::vector<Vec2> uv{{0, 1}, {0, 0}, {1, 1}, {1, 1}};
-  mesh.uv[0] = uv;
-  generateTangents(mesh, uv);
+  std::vector<std::vector<Vec2>> uv{{{0, 1}, {0, 0}, {1, 1}, {1, 1}}};
+  mesh.uv[0] = uv[0];
+  generateTangents(mesh, 0, uv);
   CHECK(mesh.positions.size() == 6);
+  CHECK(uv[0].size() == 6);
   CHECK(mesh.uv[0].size() == 6);
   for (int k = 0; k < 3; ++k) {
     CHECK(mesh.tangents[mesh.triangles[0][k]] == Vec4(1, 0, 0, 1));
@@ -323,12 +324,15 @@ TEST_CASE("tangents: equal vertices share a tangent, degenerate texture space st
   mesh.normals.assign(6, Vec3(0, 0, 1));
   mesh.triangles = {{0, 1, 2}, {3, 4, 5}};
   SUBCASE("welded") {
-    const std::vector<Vec2> uv{{0, 1}, {1, 1}, {0, 0}, {0, 1}, {0, 0}, {-1, 0.5f}};
-    generateTangents(mesh, uv);
+    std::vector<std::vector<Vec2>> uv{{{0, 1}, {1, 1}, {0, 0}, {0, 1}, {0, 0}, {-1, 0.5f}}};
+    generateTangents(mesh, 0, uv);
     CHECK(mesh.tangents[0] == mesh.tangents[3]);
     CHECK(mesh.tangents[2] == mesh.tangents[4]);
   }
-  SUBCASE("no texture space") { generateTangents(mesh, std::vector<Vec2>(6, Vec2(0.5f))); }
+  SUBCASE("no texture space") {
+    std::vector<std::vector<Vec2>> uv{std::vector<Vec2>(6, Vec2(0.5f))};
+    generateTangents(mesh, 0, uv);
+  }
   for (const Vec4& t : mesh.tangents) {
     CHECK(glm::length(Vec3(t)) == doctest::Approx(1));
     CHECK(std::abs(t.z) < 1e-6f);

@@ -60,12 +60,16 @@ TEST_CASE("gltf: a mesh used twice is kept once") {
   CHECK(glm::determinant(scene.instances[1].toWorld) < 0);
 }
 
-TEST_CASE("gltf: singular transforms leave the mesh out") {
+TEST_CASE("gltf: a scale of 0 along one axis flattens a mesh, along two leaves it out") {
   GltfFile file = triangleFile();
-  file.node()["scale"] = {1, 0, 1};
-  const SceneData scene = file.load();
-  CHECK(scene.instances.empty());
-  CHECK(hasWarning(scene, "cannot be inverted"));
+  file.node()["scale"] = {1, 1, 0};
+  const SceneData flat = file.load();
+  CHECK(flat.instances.size() == 1);
+  CHECK(!hasWarning(flat, "left out"));
+  file.node()["scale"] = {1, 0, 0};
+  const SceneData gone = file.load();
+  CHECK(gone.instances.empty());
+  CHECK(hasWarning(gone, "a line or a point"));
 }
 
 TEST_CASE("gltf: scenes are chosen, and may be missing") {
@@ -199,10 +203,18 @@ TEST_CASE("gltf: animations are evaluated at the frame time and clamped to their
     CHECK(origin(file.load()).x == 0);
     LoadOptions options;
     options.frameTime = 0.0f;
-    options.animation = 0;
+    CHECK(origin(file.load(options)).x == 7);  // the first
+    options.animation = "1";
+    CHECK(origin(file.load(options)).x == 8);
+    file.root["animations"][0]["name"] = "walk";
+    file.root["animations"][1]["name"] = "0";  // names come first
+    options.animation = "walk";
     CHECK(origin(file.load(options)).x == 7);
-    options.animation = 5;
-    CHECK(errorOf(file, options).find("the file has 2 animations") != std::string::npos);
+    options.animation = "0";
+    CHECK(origin(file.load(options)).x == 8);
+    options.animation = "run";
+    const std::string error = errorOf([&] { file.load(options); }, ExitCode::Usage);
+    CHECK(error.find("the file has 0 'walk', 1 '0'") != std::string::npos);
   }
   SUBCASE("key times that do not increase") {
     animate(file, "translation", "LINEAR", {0, std::nanf(""), 1}, {1, 0, 0, 2, 0, 0, 3, 0, 0}, "VEC3");

@@ -99,9 +99,12 @@ void addSceneOptions(CLI::App& command, SceneChoice& c) {
   command.add_option("--yfov", c.yfovDegrees, "Vertical field of view in degrees");
   command.add_option("--scene", c.frameScene, "Index of the glTF scene to render");
   command.add_option("--variant", c.load.variant, "Material variant by name (KHR_materials_variants)");
-  command.add_option("--frame-time", c.frameTime, "Pose of skins, morphs and animations at this time in seconds");
+  command.add_option("--frame-time", c.frameTime,
+                     "Pose of skins, morphs and nodes at this time of an animation, in seconds");
+  command.add_option("--animation", c.load.animation, "Animation by name or index (default: the first)");
   command.add_option("--env", c.environment, "Environment image, latitude-longitude (.hdr, .exr, ...)");
-  command.add_option("--env-rotate", c.environmentRotation, "Turn the environment about +Y, degrees");
+  command.add_option("--env-rotate", c.environmentRotation,
+                     "Turn the environment about +Y, degrees; at 0 its centre lies in +X, as in three.js and Blender");
   command.add_option("--env-scale", c.environmentScale, "Multiply the environment")->capture_default_str();
   command.add_option("--background", c.background,
                      "Radiance r,g,b seen by camera rays that miss, instead of the environment");
@@ -202,7 +205,8 @@ CameraData chooseCamera(const SceneData& data, const SceneChoice& c) {
   }
   if (!c.lookAt.empty()) {
     const std::vector<double> n = parseNumbers(c.lookAt, 6, "--look-at");
-    const Vec3 eye(n[0], n[1], n[2]), target(n[3], n[4], n[5]);
+    const glm::dvec3 o = data.origin;
+    const Vec3 eye(n[0] - o.x, n[1] - o.y, n[2] - o.z), target(n[3] - o.x, n[4] - o.y, n[5] - o.z);
     if (eye == target) throw Error(ExitCode::Usage, "--look-at: eye and target are the same point");
     const Vec3 forward = glm::normalize(target - eye);
     const Vec3 up = std::abs(forward.y) > 0.999f ? Vec3(0, 0, 1) : Vec3(0, 1, 0);

@@ -74,8 +74,8 @@ std::vector<Attribute> planAttributes(const Scene& scene, const Plan& plan, cons
       text("braid/filter", toString(s.filter)),
       integer("braid/maxDepth", static_cast<uint64_t>(s.maxDepth)),
       text("braid/varianceIs", varianceIs(plan)),
-      matrix("worldToCamera", plan.camera.worldToCamera()),
-      matrix("worldToNDC", plan.camera.worldToNdc()),
+      matrix("worldToCamera", plan.camera.worldToCamera(scene.data().origin)),
+      matrix("worldToNDC", plan.camera.worldToNdc(scene.data().origin)),
   };
   if (s.clamp > 0) list.push_back(number("braid/clamp", static_cast<double>(s.clamp)));
   return list;

@@ -18,12 +18,19 @@ struct InfoOptions {
   bool json = false;
 };
 
-nlohmann::json toJson(const Vec3& v) { return {v.x, v.y, v.z}; }
+// A point in the coordinates of the file; as many digits as a float has where that is all that is known.
+nlohmann::json inFile(const Vec3& v, const glm::dvec3& origin) {
+  if (origin == glm::dvec3(0)) return {v.x, v.y, v.z};
+  const glm::dvec3 p = glm::dvec3(v) + origin;
+  return {p.x, p.y, p.z};
+}
 
 nlohmann::json describe(const Scene& scene) {
   const SceneData& data = scene.data();
   const SceneTraits& t = scene.traits();
-  nlohmann::json cameras = nlohmann::json::array(), lights = nlohmann::json::array();
+  nlohmann::json cameras = nlohmann::json::array(), lights = nlohmann::json::array(),
+                 animations = nlohmann::json::array();
+  for (const AnimationClip& a : data.animations) animations.push_back({{"name", a.name}, {"seconds", a.seconds}});
   for (const CameraData& c : data.cameras)
     cameras.push_back({{"name", c.name}, {"type", c.orthographic ? "orthographic" : "perspective"}});
   for (const PunctualLight& l : data.lights)
@@ -43,10 +50,11 @@ nlohmann::json describe(const Scene& scene) {
           {"meshes", t.meshes},
           {"instances", t.instances},
           {"bounds",
-           {{"min", empty ? nlohmann::json() : toJson(scene.bounds().lo)},
-            {"max", empty ? nlohmann::json() : toJson(scene.bounds().hi)}}},
+           {{"min", empty ? nlohmann::json() : inFile(scene.bounds().lo, data.origin)},
+            {"max", empty ? nlohmann::json() : inFile(scene.bounds().hi, data.origin)}}},
           {"cameras", data.defaultCamera ? nlohmann::json::array() : cameras},
           {"lights", lights},
+          {"animations", animations},
           {"emitters", emitters.size()},
           {"emissiveTriangles", t.emissiveTriangles},
           {"materials", t.materials},
@@ -77,6 +85,11 @@ void print(const nlohmann::json& j) {
   fmt::print("  traits      {}\n  extensions  {}\n", list(j["traits"]), list(j["extensionsUsed"]));
   if (!j["extensionsIgnored"].empty()) fmt::print("  ignored     {}\n", list(j["extensionsIgnored"]));
   if (!j["variants"].empty()) fmt::print("  variants    {}\n", list(j["variants"]));
+  for (size_t i = 0; i < j["animations"].size(); ++i) {
+    const nlohmann::json& a = j["animations"][i];
+    fmt::print("  {:<11} {} '{}', {:.6g} s\n", i == 0 ? "animations" : "", i, a["name"].get<std::string>(),
+               a["seconds"].get<double>());
+  }
 }
 
 int runInfo(InfoOptions o) {

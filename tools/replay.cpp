@@ -22,20 +22,27 @@ struct ReplayOptions {
   std::string pixel, strategies;
 };
 
+std::string show(const glm::dvec3& v) { return fmt::format("({:.13g} {:.13g} {:.13g})", v.x, v.y, v.z); }
 std::string show(const Vec3& v) { return fmt::format("({:.6g} {:.6g} {:.6g})", v.x, v.y, v.z); }
+
+// A point in the coordinates of the file.
+std::string place(const Vec3& p, const glm::dvec3& origin) {
+  return origin == glm::dvec3(0) ? show(p) : show(glm::dvec3(p) + origin);
+}
 
 class PrintingObserver final : public PathObserver {
  public:
   explicit PrintingObserver(const Scene& scene) : scene_(scene) {}
   void onRay(const PathState& path) override {
-    fmt::print("{}: ray from {} along {}, throughput {}\n", path.segments, show(path.origin), show(path.direction),
-               show(path.throughput));
+    fmt::print("{}: ray from {} along {}, throughput {}\n", path.segments, place(path.origin, scene_.data().origin),
+               show(path.direction), show(path.throughput));
   }
   void onMiss() override { fmt::print("   leaves the scene\n"); }
   void onHit(const Hit& hit) override {
     fmt::print("   hits mesh {} '{}', triangle {}, material '{}' at {}, {:.6g} m away, {} side, shading normal {}\n",
-               hit.meshIndex, hit.mesh->name, hit.triangle, hit.material->name, show(hit.position), hit.distance,
-               hit.front ? "front" : "back", show(hit.frame.n));
+               hit.meshIndex, hit.mesh->name, hit.triangle, hit.material->name,
+               place(hit.position, scene_.data().origin), hit.distance, hit.front ? "front" : "back",
+               show(hit.frame.n));
   }
   void onLight(const ShadowRay& ray, bool visible) override {
     fmt::print("   light sample along {}: {} {}\n", show(ray.ray.direction), visible ? "adds" : "hidden, would add",
@@ -48,14 +55,18 @@ class PrintingObserver final : public PathObserver {
 
 class PrintingStrategies final : public StrategyObserver {
  public:
+  explicit PrintingStrategies(const glm::dvec3& origin) : origin_(origin) {}
   void onVertex(const SubpathVertex& v, Transport transport) override {
     fmt::print("{} vertex {}: mesh {} '{}', triangle {}, material '{}' at {}, throughput {}\n",
                transport == Transport::Power ? "light" : "eye", v.segments, v.hit.meshIndex, v.hit.mesh->name,
-               v.hit.triangle, v.hit.material->name, show(v.hit.position), show(v.throughput));
+               v.hit.triangle, v.hit.material->name, place(v.hit.position, origin_), show(v.throughput));
   }
   void onContribution(int s, int t, int x, int y, const Spectrum& value) override {
     fmt::print("   s={} t={} adds {} to pixel {},{}\n", s, t, show(value), x, y);
   }
+
+ private:
+  glm::dvec3 origin_;
 };
 
 // One EXR with the image of every strategy as a layer "s<s>t<t>" and their sum as the headline.
@@ -109,7 +120,7 @@ int runReplay(const ReplayOptions& o) {
   }
   if (bidirectional) {
     fmt::print("bdpt pass {} pixel {},{} of {}x{}\n", o.pass, x, y, settings.width, settings.height);
-    PrintingStrategies printer;
+    PrintingStrategies printer(scene->data().origin);
     replayBidirectionalPixel({context, plan, o.pass}, x, y, printer);
     return 0;
   }

@@ -30,6 +30,7 @@ std::vector<StateOption> sceneIdentity(const SceneChoice& c, const SceneData& da
           {"--scene", std::to_string(c.frameScene)},
           {"--variant", c.load.variant},
           {"--frame-time", fmt::format("{}", c.frameTime)},
+          {"--animation", c.load.animation},
           {"--double-sided", yesOrNo(c.load.doubleSided)},
           {"--no-default-light", yesOrNo(c.noDefaultLight)},
           {"the default light", yesOrNo(data.defaultLight)}};

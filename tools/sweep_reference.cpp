@@ -116,8 +116,9 @@ ImageFile readChecked(const std::string& path, const ReferenceFrame& frame, uint
 
 ReferenceFrame referenceFrame(const Scene& scene, const CameraData& camera, const Settings& settings) {
   const Camera view(camera, settings.width, settings.height);
-  return {settings.width,    settings.height,          view.worldToCamera(),
-          view.worldToNdc(), scene.data().contentHash, settings.maxDepth};
+  const glm::dvec3& origin = scene.data().origin;
+  return {settings.width,          settings.height,          view.worldToCamera(origin),
+          view.worldToNdc(origin), scene.data().contentHash, settings.maxDepth};
 }
 
 std::string referenceName(const ReferenceFrame& frame) {

@@ -40,14 +40,18 @@ double Camera::pixelPdf(const Vec3& d) const {
   return cosine > 0 ? perArea / (cosine * cosine * cosine) : 0.0;
 }
 
-Mat4 Camera::worldToCamera() const {
+Mat4 Camera::worldToCamera(const glm::dvec3& origin) const {
   Mat4 m(1);
   for (int i = 0; i < 3; ++i) m[i] = Vec4(right_[i], up_[i], -forward_[i], 0);
   m[3] = Vec4(-glm::dot(right_, position_), -glm::dot(up_, position_), glm::dot(forward_, position_), 1);
+  if (origin != glm::dvec3(0)) {
+    const glm::dmat3 rotation = glm::transpose(glm::dmat3(right_, up_, -forward_));
+    m[3] = Vec4(-(rotation * (glm::dvec3(position_) + origin)), 1);
+  }
   return m;
 }
 
-Mat4 Camera::worldToNdc() const {
+Mat4 Camera::worldToNdc(const glm::dvec3& origin) const {
   Mat4 projection(1);
   projection[0][0] = 1 / halfWidth_;
   projection[1][1] = 1 / halfHeight_;
@@ -56,7 +60,7 @@ Mat4 Camera::worldToNdc() const {
     projection[2][3] = -1;
     projection[3][3] = 0;
   }
-  return projection * worldToCamera();
+  return projection * worldToCamera(origin);
 }
 
 }  // namespace braid

@@ -34,8 +34,9 @@ class Camera {
   Vec3 forward() const { return forward_; }
   // Area of the frame on the plane at distance 1 (perspective) or on the sensor (orthographic), in m².
   float frameArea() const { return 4 * halfWidth_ * halfHeight_; }
-  Mat4 worldToCamera() const;
-  Mat4 worldToNdc() const;
+  // For points in coordinates in which the scene's zero lies at `origin` (SceneData::origin).
+  Mat4 worldToCamera(const glm::dvec3& origin = glm::dvec3(0)) const;
+  Mat4 worldToNdc(const glm::dvec3& origin = glm::dvec3(0)) const;
 
  private:
   Vec3 position_{0}, right_{1, 0, 0}, up_{0, 1, 0}, forward_{0, 0, -1};

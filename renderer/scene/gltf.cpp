@@ -7,6 +7,7 @@
 #include "renderer/scene/gltf_document.h"
 #include "renderer/scene/gltf_material.h"
 #include "renderer/scene/gltf_nodes.h"
+#include "renderer/scene/gltf_pose.h"
 #include "renderer/scene/scene_defaults.h"
 
 namespace braid {
@@ -68,6 +69,7 @@ SceneData describe(const Document& document) {
   scene.extensionsIgnored = document.extensionsIgnored;
   scene.variants = document.variants;
   for (const SceneSource& source : document.scenes) scene.sceneNames.push_back(source.name);
+  for (const Animation& a : document.animations) scene.animations.push_back({a.name, clipSeconds(document, a)});
   return scene;
 }
 

@@ -15,7 +15,7 @@ struct LoadOptions {
   std::optional<int> scene;        // index into scenes; none: the file's default, else 0
   std::string variant;             // KHR_materials_variants name; empty: none
   std::optional<float> frameTime;  // seconds into the animation; none: the rest pose
-  std::optional<int> animation;    // none: all animations of the file play together from time 0
+  std::string animation;           // the clip that frameTime is in, by name or index; empty: the first
   bool defaultLight = true;        // add a grey dome to a file without any light or emitter
   bool doubleSided = false;        // treat every material as double-sided
   bool allowExternal = false;      // follow symbolic links out of the folder of the file

@@ -2,6 +2,7 @@
 // Animation channels evaluated at one moment: STEP, LINEAR and CUBICSPLINE, clamped outside their keys.
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <unordered_map>
 
 #include "renderer/scene/gltf_accessor.h"
@@ -138,12 +139,21 @@ class Animator {
 
 }  // namespace
 
-void animate(Document& document, std::optional<int> animation, float time) {
+void animate(Document& document, const Animation& animation, float time) {
   Animator animator(document, time);
-  for (size_t i = 0; i < document.animations.size(); ++i) {
-    if (animation && static_cast<size_t>(*animation) != i) continue;
-    for (const AnimationChannel& channel : document.animations[i].channels) animator.apply(channel);
+  for (const AnimationChannel& channel : animation.channels) animator.apply(channel);
+}
+
+double clipSeconds(const Document& document, const Animation& animation) {
+  double seconds = 0;
+  std::set<uint32_t> inputs;
+  for (const AnimationChannel& channel : animation.channels) {
+    if (!inputs.insert(channel.input).second || document.accessors[channel.input].count == 0) continue;
+    const auto last = static_cast<uint32_t>(document.accessors[channel.input].count - 1);
+    const float time = gatherFloats(document, channel.input, std::span(&last, 1)).front();
+    if (std::isfinite(time)) seconds = std::max(seconds, static_cast<double>(time));
   }
+  return seconds;
 }
 
 }  // namespace braid::gltf

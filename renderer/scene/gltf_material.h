@@ -37,9 +37,15 @@ void forEachTexture(MaterialType& m, const Visit& visit) {
 // The materials of the kept primitives, in order of first use, with compacted texture and uv indices.
 class MaterialTable {
  public:
+  // What a tangent frame follows: a uv set of the file, and the linear part of a texture's transform, row-major.
+  struct TangentSource {
+    uint32_t set = 0;
+    std::array<float, 4> linear{1, 0, 0, 1};
+    bool operator==(const TangentSource&) const = default;
+  };
   struct Uvs {
     std::array<uint32_t, 2> set{kNone, kNone};  // the file's uv set behind each slot
-    uint32_t tangentSet = 0;                    // the uv set that tangents follow
+    std::vector<TangentSource> tangents;        // of the frames that the material reads, at least one
   };
 
   MaterialTable(Document& document, SceneData& scene, bool doubleSided)

@@ -6,6 +6,7 @@
 
 #include "renderer/scene/gltf_accessor.h"
 #include "renderer/scene/mesh_repair.h"
+#include "renderer/scene/placement.h"
 #include "renderer/scene/tangents.h"
 
 namespace braid::gltf {
@@ -27,9 +28,14 @@ class MeshBuilder {
     if (!mesh_.normals.empty() && wantsTangents()) readTangents();
     readUvs();
     readColors();
-    if (job_.joints) skin();
+    if (job_.joints) {
+      if (job_.origin == glm::dvec3(0)) {
+        skin<float>();
+      } else {
+        skin<double>();  // floats would lose what is left of sums of large numbers
+      }
+    }
     if (!dropBadTriangles(mesh_, report_, primitive_.pointer)) return {};
-    extras_.uv = std::move(tangentUv_);
     compactVertices(mesh_, extras_);
     repairNormals(mesh_, report_, primitive_.pointer);
     finishTangents();
@@ -181,11 +187,14 @@ class MeshBuilder {
       for (Vec2& uv : mesh_.uv[slot]) {
         if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = Vec2(0);
       }
-      if (set == job_.uvs.tangentSet) tangentSlot_ = slot;
+      slotSet_[slot] = set;
     }
-    const bool isExtra = wantsTangents() && mesh_.tangents.empty() && tangentSlot_ == kNone;
-    if (isExtra) tangentUv_ = readUv(job_.uvs.tangentSet);
+    if (!wantsTangents() || !mesh_.tangents.empty()) return;
+    for (const MaterialTable::TangentSource& source : job_.uvs.tangents)
+      extras_.uv.push_back(slotOf(source.set) == kNone ? readUv(source.set) : std::vector<Vec2>());
   }
+
+  uint32_t slotOf(uint32_t set) const { return slotSet_[0] == set ? 0 : slotSet_[1] == set ? 1 : kNone; }
 
   void readColors() {
     uint32_t components = 0;
@@ -201,24 +210,36 @@ class MeshBuilder {
     }
   }
 
+  template <class T>
+  using Matrix = glm::mat<4, 4, T>;
+
+  template <class T>
   void skin() {
-    std::vector<glm::mat4> blended(vertices_, glm::mat4(0));
+    std::vector<Matrix<T>> joints;
+    for (glm::dmat4 joint : *job_.joints) {
+      for (int c = 0; c < 4; ++c) joint[c] -= glm::dvec4(job_.origin * joint[c].w, 0);
+      joints.emplace_back(joint);
+    }
+    std::vector<Matrix<T>> blended(vertices_, Matrix<T>(0));
     std::vector<float> total(vertices_, 0.0f);
-    for (int set = 0; has("JOINTS_" + std::to_string(set)); ++set) addInfluences(std::to_string(set), blended, total);
+    for (int set = 0; has("JOINTS_" + std::to_string(set)); ++set)
+      addInfluences(std::to_string(set), joints, blended, total);
     uint64_t unweighted = 0;
     for (size_t v = 0; v < vertices_; ++v) {
       if (!(total[v] > 1e-6f)) {
         ++unweighted;
-        blended[v] = job_.joints->front();
+        blended[v] = joints.front();
         total[v] = 1;
       }
-      transformVertex(v, blended[v] * (1 / total[v]));
+      transformVertex<T>(v, blended[v] * (1 / static_cast<T>(total[v])));
     }
     if (unweighted > 0)
       report_.warn(primitive_.pointer, "a skinned vertex has no weights; it follows the first joint", unweighted);
   }
 
-  void addInfluences(const std::string& set, std::vector<glm::mat4>& blended, std::vector<float>& total) {
+  template <class T>
+  void addInfluences(const std::string& set, const std::vector<Matrix<T>>& moves, std::vector<Matrix<T>>& blended,
+                     std::vector<float>& total) {
     uint32_t jointWidth = 0, weightWidth = 0;
     const std::vector<float> joints = values("JOINTS_" + set, jointWidth),
                              weights = values("WEIGHTS_" + set, weightWidth);
@@ -230,21 +251,20 @@ class MeshBuilder {
       if (!(weights[i] > 0) || !std::isfinite(weights[i])) continue;
       // Accessors were validated; a compressed mesh may still name a joint that does not exist.
       const auto joint = static_cast<size_t>(std::max(joints[i], 0.0f));
-      if (joint >= job_.joints->size()) continue;
-      blended[i / 4] += (*job_.joints)[joint] * weights[i];
+      if (joint >= moves.size()) continue;
+      blended[i / 4] += moves[joint] * static_cast<T>(weights[i]);
       total[i / 4] += weights[i];
     }
   }
 
-  void transformVertex(size_t v, const glm::mat4& m) {
-    mesh_.positions[v] = Vec3(m * Vec4(mesh_.positions[v], 1));
+  template <class T>
+  void transformVertex(size_t v, const Matrix<T>& m) {
+    mesh_.positions[v] = Vec3(m * glm::vec<4, T>(glm::vec<3, T>(mesh_.positions[v]), 1));
     const glm::mat3 linear(m);
     if (!mesh_.normals.empty()) {
-      // Cofactors: the inverse transpose times the determinant, defined for singular matrices too.
-      const glm::mat3 cofactors(glm::cross(linear[1], linear[2]), glm::cross(linear[2], linear[0]),
-                                glm::cross(linear[0], linear[1]));
-      const float side = glm::dot(linear[0], cofactors[0]) < 0 ? -1.0f : 1.0f;
-      mesh_.normals[v] = normalizedOr(side * (cofactors * mesh_.normals[v]), Vec3(0));
+      const glm::mat3 normalMatrix = cofactors(linear);
+      const float side = glm::dot(linear[0], normalMatrix[0]) < 0 ? -1.0f : 1.0f;
+      mesh_.normals[v] = normalizedOr(side * (normalMatrix * mesh_.normals[v]), Vec3(0));
     }
     if (!mesh_.tangents.empty()) mesh_.tangents[v] = Vec4(linear * Vec3(mesh_.tangents[v]), mesh_.tangents[v].w);
   }
@@ -254,15 +274,29 @@ class MeshBuilder {
     if (!mesh_.tangents.empty() && repairTangents(mesh_, report_, primitive_.pointer)) return;
     mesh_.tangents.clear();
     if (!job_.needsTangents) return;
-    const std::vector<Vec2>& uv = tangentSlot_ == kNone ? extras_.uv : mesh_.uv[tangentSlot_];
-    if (uv.empty()) {
+    const size_t frames = job_.uvs.tangents.size();
+    extras_.uv.resize(frames);
+    for (size_t frame = 0; frame < frames; ++frame) layOut(frame);
+    if (std::all_of(extras_.uv.begin(), extras_.uv.end(), [](const auto& uv) { return uv.empty(); })) {
       report_.warn(primitive_.pointer,
                    "a material needs tangents, but the primitive has neither tangents nor texture coordinates");
       return;
     }
     // Flat shading has a tangent frame for each triangle, so its vertices cannot be shared.
     if (mesh_.normals.empty()) splitIntoFlatTriangles(mesh_, extras_);
-    generateTangents(mesh_, uv);
+    for (size_t frame = 0; frame < frames; ++frame) {
+      if (!extras_.uv[frame].empty()) generateTangents(mesh_, frame, extras_.uv);
+    }
+  }
+
+  // Makes extras_.uv the coordinates by which the texture of a frame lies on the mesh, but for the offset.
+  void layOut(size_t frame) {
+    const MaterialTable::TangentSource& source = job_.uvs.tangents[frame];
+    std::vector<Vec2>& uv = extras_.uv[frame];
+    const uint32_t slot = slotOf(source.set);
+    if (slot != kNone) uv = mesh_.uv[slot];
+    const auto& [a, b, c, d] = source.linear;
+    for (Vec2& v : uv) v = Vec2(a * v.x + b * v.y, c * v.x + d * v.y);
   }
 
   const Document& document_;
@@ -274,8 +308,7 @@ class MeshBuilder {
   uint64_t vertices_ = 0;           // read
   std::vector<uint32_t> selected_;  // which ones, ascending; empty: all
   TriangleMesh mesh_;
-  uint32_t tangentSlot_ = kNone;  // the uv slot tangents follow, if it is kept
-  std::vector<Vec2> tangentUv_;   // else its texture coordinates
+  std::array<uint32_t, 2> slotSet_{kNone, kNone};  // the uv set that each slot holds
   ExtraAttributes extras_;
 };
 

@@ -17,8 +17,9 @@ struct MeshJob {
   MaterialTable::Uvs uvs;
   bool needsTangents = false;
   bool keepAllAttributes = false;
-  std::vector<float> weights;                            // of the morph targets
-  std::shared_ptr<const std::vector<glm::mat4>> joints;  // joint to world times inverse bind; null: not skinned
+  std::vector<float> weights;                             // of the morph targets
+  std::shared_ptr<const std::vector<glm::dmat4>> joints;  // joint to world times inverse bind; null: not skinned
+  glm::dvec3 origin{0};                                   // taken from skinned positions
 };
 
 // What a compressed mesh holds, with attributes by name.

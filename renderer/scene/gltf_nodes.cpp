@@ -5,20 +5,13 @@
 #include <cmath>
 
 #include "renderer/core/parallel.h"
+#include "renderer/scene/placement.h"
 
 namespace braid::gltf {
 
 namespace {
 
 std::string nodePlace(uint32_t node) { return "/nodes/" + std::to_string(node); }
-
-// Inverting must not lose the shape: volume compared with the cube of the longest axis.
-bool isInvertible(const glm::dmat4& m) {
-  const glm::dmat3 linear(m);
-  const double longest = std::max({glm::length(linear[0]), glm::length(linear[1]), glm::length(linear[2])});
-  const double volume = std::abs(glm::determinant(linear));
-  return std::isfinite(longest) && longest > 1e-18 && longest < 1e18 && volume > 1e-18 * longest * longest * longest;
-}
 
 bool isFiniteMatrix(const Mat4& m) {
   const float* v = glm::value_ptr(m);
@@ -63,6 +56,7 @@ class SceneBuilder {
       if (document_.nodes[node].mesh != kNone) addMesh(node);
     }
     buildMeshes();
+    placeAll();
   }
 
  private:
@@ -123,14 +117,15 @@ class SceneBuilder {
     if (camera.name.empty()) camera.name = "camera " + std::to_string(scene_.cameras.size());
     // Scale does not apply to cameras: only where the node stands, its backward axis and which way is up.
     const glm::dmat4& world = pose_.world[index];
-    const glm::dvec3 back(world[2]), up(world[1]);
+    const glm::dmat3 axes = axesOf(world);
+    const glm::dvec3 back = axes[2], up = axes[1];
     const glm::dvec3 side = glm::cross(up, back);
     if (!(glm::length(side) > 1e-30) || !isFiniteMatrix(Mat4(world))) {
       document_.report.warn(nodePlace(index), "a camera's node has a singular transform; the camera is left out");
       return;
     }
     const glm::dvec3 z = glm::normalize(back), x = glm::normalize(side);
-    camera.toWorld = Mat4(glm::dmat4(glm::dvec4(x, 0), glm::dvec4(glm::cross(z, x), 0), glm::dvec4(z, 0), world[3]));
+    cameras_.emplace_back(glm::dvec4(x, 0), glm::dvec4(glm::cross(z, x), 0), glm::dvec4(z, 0), world[3]);
     scene_.cameras.push_back(std::move(camera));
   }
 
@@ -140,30 +135,32 @@ class SceneBuilder {
     PunctualLight light = document_.lights[node.light];
     if (!node.name.empty()) light.name = node.name;
     const glm::dmat4& world = pose_.world[index];
-    const glm::dvec3 direction = -glm::dvec3(world[2]);
+    const bool isPoint = light.kind == PunctualKind::Point;
+    const glm::dvec3 direction = isPoint ? glm::dvec3(0, 0, -1) : -axesOf(world)[2];
     if (!(glm::length(direction) > 1e-30) || !isFiniteMatrix(Mat4(world))) {
       document_.report.warn(nodePlace(index), "a light's node has a singular transform; the light is left out");
       return;
     }
-    light.position = Vec3(world[3]);
+    lights_.emplace_back(world[3]);
     light.direction = Vec3(glm::normalize(direction));
     scene_.lights.push_back(std::move(light));
   }
 
   void addMesh(uint32_t index) {
     const Node& node = document_.nodes[index];
-    std::vector<Mat4> placed;
+    std::vector<glm::dmat4> placed;
+    if (!firstMesh_) firstMesh_ = index;
     if (node.skin != kNone) {
       placed.emplace_back(1);
     } else {
-      budget(instanceCount(document_, node) * sizeof(glm::dmat4));
+      budget(2 * instanceCount(document_, node) * sizeof(glm::dmat4));
       for (const glm::dmat4& local : instanceTransforms(document_, node)) {
         const glm::dmat4 toWorld = pose_.world[index] * local;
-        if (isInvertible(toWorld) && isFiniteMatrix(Mat4(toWorld))) {
+        if (shapeOf(toWorld) != Shape::Gone && isFiniteMatrix(Mat4(toWorld))) {
           placed.emplace_back(toWorld);
         } else {
           document_.report.warn(nodePlace(index),
-                                "a mesh with a transform that cannot be inverted (a scale of 0) is left out");
+                                "a mesh that its transform makes a line or a point (a scale of 0) is left out");
         }
       }
     }
@@ -172,7 +169,12 @@ class SceneBuilder {
       const std::string suffix = mesh.primitives.size() > 1 ? "/" + std::to_string(p) : "";
       const uint32_t job = jobFor(mesh.primitives[p], node, pose_.weights[index], mesh.name + suffix);
       budget(placed.size() * sizeof(MeshInstance));
-      for (const Mat4& toWorld : placed) scene_.instances.push_back({job, toWorld});
+      for (const glm::dmat4& toWorld : placed) {
+        scene_.instances.push_back({job, Mat4(1)});
+        transforms_.push_back(toWorld);
+        // What is flattened cannot share its triangles.
+        if (shapeOf(toWorld) == Shape::Flat) budget(estimatedBytes(document_, mesh.primitives[p]));
+      }
     }
   }
 
@@ -213,10 +215,10 @@ class SceneBuilder {
     return primitive.material;
   }
 
-  std::shared_ptr<const std::vector<glm::mat4>> jointsOf(uint32_t skin) {
+  std::shared_ptr<const std::vector<glm::dmat4>> jointsOf(uint32_t skin) {
     if (!skins_[skin]) {
       skins_[skin] =
-          std::make_shared<const std::vector<glm::mat4>>(jointMatrices(document_, pose_, document_.skins[skin]));
+          std::make_shared<const std::vector<glm::dmat4>>(jointMatrices(document_, pose_, document_.skins[skin]));
     }
     return skins_[skin];
   }
@@ -242,11 +244,51 @@ class SceneBuilder {
       if (built[i].triangles.empty()) continue;
       placed[i] = static_cast<uint32_t>(scene_.meshes.size());
       scene_.meshes.push_back(std::move(built[i]));
+      jobOf_.push_back(i);
     }
-    std::erase_if(scene_.instances, [&](MeshInstance& instance) {
-      instance.mesh = placed[instance.mesh];
-      return instance.mesh == kNone;
+    size_t kept = 0;
+    for (size_t i = 0; i < scene_.instances.size(); ++i) {
+      const uint32_t mesh = placed[scene_.instances[i].mesh];
+      if (mesh == kNone) continue;
+      scene_.instances[kept].mesh = mesh;
+      transforms_[kept++] = transforms_[i];
+    }
+    scene_.instances.resize(kept);
+    transforms_.resize(kept);
+  }
+
+  // Up to here everything stands in the file's coordinates, as doubles.
+  void placeAll() {
+    glm::dvec3 root(0);
+    if (firstMesh_) {
+      uint32_t node = *firstMesh_;
+      while (document_.nodes[node].parent != kNone) node = document_.nodes[node].parent;
+      root = glm::dvec3(pose_.world[node][3]);
+    }
+    scene_.origin = originFor(scene_, transforms_, root);
+    if (scene_.origin != glm::dvec3(0)) {
+      skinAnew();
+      bringVerticesNear(scene_, transforms_, scene_.origin);
+    }
+    for (size_t i = 0; i < transforms_.size(); ++i)
+      scene_.instances[i].toWorld = relativeTo(transforms_[i], scene_.origin);
+    for (size_t i = 0; i < cameras_.size(); ++i) scene_.cameras[i].toWorld = relativeTo(cameras_[i], scene_.origin);
+    for (size_t i = 0; i < lights_.size(); ++i) scene_.lights[i].position = Vec3(lights_[i] - scene_.origin);
+  }
+
+  // Skinned vertices are in the world already: they are computed again about the origin.
+  void skinAnew() {
+    parallelFor(scene_.meshes.size(), [&](size_t m) {
+      MeshJob& job = jobs_[jobOf_[m]];
+      if (!job.joints) return;
+      job.origin = scene_.origin;
+      Report told;
+      scene_.meshes[m] = buildMesh(document_, job, told);
     });
+    for (size_t i = 0; i < transforms_.size(); ++i) {
+      if (jobs_[jobOf_[scene_.instances[i].mesh]].joints)
+        transforms_[i] = glm::translate(transforms_[i], scene_.origin);
+    }
   }
 
   Document& document_;
@@ -256,7 +298,11 @@ class SceneBuilder {
   Pose pose_;
   uint32_t variant_ = kNone;
   uint64_t spent_ = 0;
-  std::vector<std::shared_ptr<const std::vector<glm::mat4>>> skins_;
+  std::optional<uint32_t> firstMesh_;             // the first node that shows one
+  std::vector<glm::dmat4> transforms_, cameras_;  // of scene_.instances and scene_.cameras
+  std::vector<glm::dvec3> lights_;                // positions of scene_.lights
+  std::vector<size_t> jobOf_;                     // of scene_.meshes
+  std::vector<std::shared_ptr<const std::vector<glm::dmat4>>> skins_;
   std::map<GeometryKey, const Primitive*> representatives_;
   std::map<MeshKey, uint32_t> jobIndex_;
   std::vector<MeshJob> jobs_;

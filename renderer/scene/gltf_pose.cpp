@@ -37,17 +37,28 @@ std::vector<float> morphWeights(const Document& document, const Node& node) {
   return node.weights ? *node.weights : document.meshes[node.mesh].weights;
 }
 
+// By name, else by index; the first if none is asked for.
+const Animation* chosenAnimation(const Document& document, const std::string& choice) {
+  const std::vector<Animation>& all = document.animations;
+  if (choice.empty()) return all.empty() ? nullptr : &all.front();
+  std::string known;
+  for (size_t i = 0; i < all.size(); ++i) {
+    if (all[i].name == choice) return &all[i];
+    known += (i == 0 ? "" : ", ") + std::to_string(i) + (all[i].name.empty() ? "" : " " + quoted(all[i].name));
+  }
+  for (size_t i = 0; i < all.size(); ++i) {
+    if (std::to_string(i) == choice) return &all[i];
+  }
+  throw SceneError(ExitCode::Usage, document.path, "/animations",
+                   "no animation " + quoted(choice) + ": the file has " + (known.empty() ? "none" : known));
+}
+
 }  // namespace
 
 Pose makePose(Document& document, const LoadOptions& options) {
-  if (options.animation &&
-      (*options.animation < 0 || static_cast<size_t>(*options.animation) >= document.animations.size())) {
-    document.report.problem("/animations", "animation " + std::to_string(*options.animation) +
-                                               " was asked for, but the file has " +
-                                               counted(document.animations.size(), "animation", "animations"));
-    document.report.throwIfBroken(document.path);
-  }
-  if (options.frameTime || options.animation) animate(document, options.animation, options.frameTime.value_or(0.0f));
+  const Animation* animation = chosenAnimation(document, options.animation);
+  if (animation && (options.frameTime || !options.animation.empty()))
+    animate(document, *animation, options.frameTime.value_or(0.0f));
   const size_t count = document.nodes.size();
   Pose pose{std::vector<glm::dmat4>(count), std::vector<std::vector<float>>(count), std::vector<bool>(count)};
   for (const uint32_t i : topDown(document)) {
@@ -60,10 +71,10 @@ Pose makePose(Document& document, const LoadOptions& options) {
   return pose;
 }
 
-std::vector<glm::mat4> jointMatrices(const Document& document, const Pose& pose, const Skin& skin) {
+std::vector<glm::dmat4> jointMatrices(const Document& document, const Pose& pose, const Skin& skin) {
   std::vector<float> inverse;
   if (skin.inverseBindMatrices != kNone) inverse = readFloats(document, skin.inverseBindMatrices);
-  std::vector<glm::mat4> joints;
+  std::vector<glm::dmat4> joints;
   for (size_t i = 0; i < skin.joints.size(); ++i) {
     const glm::dmat4 bind =
         16 * i + 16 <= inverse.size() ? glm::dmat4(glm::make_mat4(&inverse[16 * i])) : glm::dmat4(1);

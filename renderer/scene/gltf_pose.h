@@ -15,15 +15,18 @@ struct Pose {
   std::vector<bool> visible;                // with all ancestors
 };
 
-// Applies the animations to the nodes of the document and multiplies transforms down the tree. The document must be
-// valid.
+// Applies the chosen animation to the nodes of the document and multiplies transforms down the tree. The document must
+// be valid. Throws SceneError(Usage) if it has no such animation.
 Pose makePose(Document& document, const LoadOptions& options);
 
-// Applies all channels of the chosen animations at `time`. gltf_animation.cpp
-void animate(Document& document, std::optional<int> animation, float time);
+// gltf_animation.cpp: applies all channels of a clip at `time`.
+void animate(Document& document, const Animation& animation, float time);
+
+// The last key time of a clip.
+double clipSeconds(const Document& document, const Animation& animation);
 
 // Reads the joint matrices of a skin: joint to world times inverse bind.
-std::vector<glm::mat4> jointMatrices(const Document& document, const Pose& pose, const Skin& skin);
+std::vector<glm::dmat4> jointMatrices(const Document& document, const Pose& pose, const Skin& skin);
 
 // How many times EXT_mesh_gpu_instancing repeats the node's mesh.
 uint64_t instanceCount(const Document& document, const Node& node);

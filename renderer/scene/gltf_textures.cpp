@@ -11,11 +11,38 @@ namespace braid::gltf {
 
 namespace {
 
-uint32_t tangentUvSet(const Material& m) {
-  for (const TextureRef* ref : {&m.normalTexture, &m.clearcoatNormalTexture, &m.anisotropyTexture}) {
-    if (*ref) return ref->uvSet;
+using TangentSource = MaterialTable::TangentSource;
+
+TangentSource tangentSource(const TextureRef& ref) {
+  TangentSource source{ref.uvSet, {ref.matrix[0], ref.matrix[1], ref.matrix[3], ref.matrix[4]}};
+  // Stretching turns no tangent.
+  const std::array<float, 4>& l = source.linear;
+  if (l[0] > 0 && l[1] == 0 && l[2] == 0 && l[3] > 0) source.linear = {1, 0, 0, 1};
+  return source;
+}
+
+// One frame for each way in which the textures that read tangents lie, that of the normal map first. Anisotropy without
+// a texture follows the coordinates as they are.
+std::vector<TangentSource> tangentSources(Material& m) {
+  std::vector<TangentSource> sources;
+  const auto frameOf = [&](const TangentSource& source) {
+    const auto found = std::find(sources.begin(), sources.end(), source);
+    const auto frame = static_cast<uint8_t>(found - sources.begin());
+    if (found == sources.end()) sources.push_back(source);
+    return frame;
+  };
+  uint32_t set = 0;
+  for (const TextureRef* ref : {&m.anisotropyTexture, &m.clearcoatNormalTexture, &m.normalTexture}) {
+    if (*ref) set = ref->uvSet;
   }
-  return 0;
+  if (m.normalTexture) frameOf(tangentSource(m.normalTexture));
+  if (m.clearcoatNormalTexture) m.coatFrame = frameOf(tangentSource(m.clearcoatNormalTexture));
+  if (m.anisotropyTexture) {
+    m.anisotropyFrame = frameOf(tangentSource(m.anisotropyTexture));
+  } else if (m.anisotropy != 0 || sources.empty()) {
+    m.anisotropyFrame = frameOf({set, {1, 0, 0, 1}});
+  }
+  return sources;
 }
 
 // Factors of exactly zero switch whole lobes off; their textures need not be read.
@@ -82,7 +109,7 @@ MaterialTable::Uvs MaterialTable::assignUvSlots(Material& material, uint32_t fil
     if (ref) sets.insert(ref.uvSet);
   });
   Uvs uvs;
-  uvs.tangentSet = tangentUvSet(material);
+  uvs.tangents = tangentSources(material);
   if (sets.size() > 2) {
     document_.report.warn("/materials/" + std::to_string(fileMaterial),
                           "a material reads more than two uv sets; the first two are used");

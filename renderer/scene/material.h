@@ -63,6 +63,7 @@ struct Material {
   TextureRef clearcoatRoughnessTexture;  // G
   TextureRef clearcoatNormalTexture;
   float clearcoatNormalScale = 1;
+  uint8_t coatFrame = 0;  // which tangents of the mesh belong to the texture: 0 `tangents`, else `otherTangents`
 
   Spectrum sheenColor{0};
   TextureRef sheenColorTexture;  // RGB (sRGB)
@@ -72,6 +73,7 @@ struct Material {
   float anisotropy = 0;
   float anisotropyRotation = 0;  // radians, counter-clockwise from the tangent
   TextureRef anisotropyTexture;  // RG direction, B strength
+  uint8_t anisotropyFrame = 0;   // as coatFrame
 
   float iridescence = 0;
   TextureRef iridescenceTexture;  // R

@@ -11,7 +11,7 @@ namespace braid::gltf {
 
 // Attributes that are needed only while a mesh is built.
 struct ExtraAttributes {
-  std::vector<Vec2> uv;
+  std::vector<std::vector<Vec2>> uv;  // of each tangent frame
 };
 
 inline Vec3 normalizedOr(const Vec3& v, const Vec3& fallback) {
@@ -49,7 +49,7 @@ void forEachAttribute(TriangleMesh& mesh, ExtraAttributes& extras, const Visit& 
   present(mesh.uv[0]);
   present(mesh.uv[1]);
   present(mesh.colors);
-  present(extras.uv);
+  for (std::vector<Vec2>& uv : extras.uv) present(uv);
 }
 
 }  // namespace braid::gltf

@@ -21,9 +21,11 @@ struct TriangleMesh {
   std::vector<glm::uvec3> triangles;
   std::vector<Vec3> normals;   // empty: flat shading by the geometric normal
   std::vector<Vec4> tangents;  // empty unless the material needs them; w = ±1 is the sign of the bitangent
-  std::vector<Vec2> uv[2];     // empty unless a texture reads them
-  std::vector<Vec4> colors;    // empty, or linear RGBA in [0,1] multiplying the base colour
-  uint32_t material = 0;       // index into SceneData::materials, always valid
+  // Frames 1 and 2 of materials whose textures lie differently (Material::coatFrame); empty: the frame is `tangents`.
+  std::vector<Vec4> otherTangents[2];
+  std::vector<Vec2> uv[2];   // empty unless a texture reads them
+  std::vector<Vec4> colors;  // empty, or linear RGBA in [0,1] multiplying the base colour
+  uint32_t material = 0;     // index into SceneData::materials, always valid
 
   void padForEmbree() {
     positions.reserve(positions.size() + 1);
@@ -46,7 +48,7 @@ struct PunctualLight {
   Spectrum intensity{1};  // colour · intensity
   Vec3 position{0};
   Vec3 direction{0, 0, -1};  // the way the light travels, unit
-  float range = kInfinity;   // metres, a hard cut-off
+  float range = kInfinity;   // metres, see rangeWindow()
   float innerConeAngle = 0;  // radians
   float outerConeAngle = kPi / 4;
 };
@@ -60,16 +62,25 @@ struct CameraData {
   float xmag = 1, ymag = 1;     // half extents (orthographic), metres
 };
 
-// A latitude-longitude environment: up is +Y, the centre of the image lies in direction -Z; `rotation` turns it about
-// +Y.
+// A latitude-longitude environment: up is +Y, the centre of the image lies in direction +X and what is right of it
+// toward +Z, as in three.js and in files that Blender exports; `rotation` turns it about +Y, from +Z toward +X.
 struct EnvironmentData {
   std::shared_ptr<const Image> image;  // null: the constant `radiance`
   Spectrum radiance{0};                // constant radiance, or the scale of the image
   float rotation = 0;                  // radians about +Y
 };
 
+// A clip of the file, for lists.
+struct AnimationClip {
+  std::string name;
+  double seconds = 0;  // the last key time
+};
+
 struct SceneData {
   std::string file;
+  // Where the zero of all positions here lies in the coordinates of the file: a scene far from the file's own zero is
+  // brought to it before its numbers become floats (recentre.h).
+  glm::dvec3 origin{0};
   std::vector<TriangleMesh> meshes;
   std::vector<MeshInstance> instances;
   std::vector<Material> materials;
@@ -82,6 +93,7 @@ struct SceneData {
   std::vector<std::string> extensionsUsed, extensionsRequired, extensionsIgnored;
   std::vector<std::string> variants;
   std::vector<std::string> sceneNames;
+  std::vector<AnimationClip> animations;
   std::vector<std::string> warnings;  // one line each, already counted
   uint64_t contentHash = 0;           // over every referenced byte
   bool defaultCamera = false;         // the file had none: framed from the bounds

@@ -89,7 +89,7 @@ Vec4 finished(const glm::dvec3& sum, const Vec3& normal, bool mirrored) {
   return Vec4(tangent, mirrored ? -1.0f : 1.0f);
 }
 
-uint32_t duplicate(TriangleMesh& mesh, uint32_t v) {
+uint32_t duplicate(TriangleMesh& mesh, std::vector<std::vector<Vec2>>& uvs, uint32_t v) {
   const auto copy = static_cast<uint32_t>(mesh.positions.size());
   const auto append = [v](auto& array) {
     if (!array.empty()) {
@@ -99,15 +99,21 @@ uint32_t duplicate(TriangleMesh& mesh, uint32_t v) {
   };
   append(mesh.positions);
   append(mesh.normals);
+  append(mesh.tangents);
+  append(mesh.otherTangents[0]);
+  append(mesh.otherTangents[1]);
   append(mesh.uv[0]);
   append(mesh.uv[1]);
   append(mesh.colors);
+  for (std::vector<Vec2>& uv : uvs) append(uv);
   return copy;
 }
 
 }  // namespace
 
-void generateTangents(TriangleMesh& mesh, const std::vector<Vec2>& uv) {
+void generateTangents(TriangleMesh& mesh, size_t frame, std::vector<std::vector<Vec2>>& uvs) {
+  const std::vector<Vec2>& uv = uvs[frame];
+  std::vector<Vec4>& tangents = frame == 0 ? mesh.tangents : mesh.otherTangents[frame - 1];
   const std::vector<uint32_t> weld = welded(mesh, uv);
   std::vector<TextureSpace> spaces(mesh.triangles.size());
   std::vector<Sums> sums(mesh.positions.size(), Sums{glm::dvec3(0), glm::dvec3(0)});
@@ -119,7 +125,7 @@ void generateTangents(TriangleMesh& mesh, const std::vector<Vec2>& uv) {
   constexpr uint32_t kNobody = 0xffffffffu;
   const size_t originals = mesh.positions.size();
   std::vector<std::array<uint32_t, 2>> copies(originals, {kNobody, kNobody});
-  mesh.tangents.assign(originals, Vec4(0));
+  tangents.assign(originals, Vec4(0));
   for (size_t i = 0; i < spaces.size(); ++i) {
     if (spaces[i].area == 0) continue;
     const size_t side = spaces[i].area > 0 ? 1 : 0;
@@ -129,9 +135,8 @@ void generateTangents(TriangleMesh& mesh, const std::vector<Vec2>& uv) {
       uint32_t& copy = copies[original][side];
       if (copy == kNobody) {
         const bool isFirst = copies[original][1 - side] == kNobody;
-        copy = isFirst ? original : duplicate(mesh, original);
-        mesh.tangents.resize(mesh.positions.size());
-        mesh.tangents[copy] = finished(sums[weld[original]][side], mesh.normals[original], side == 1);
+        copy = isFirst ? original : duplicate(mesh, uvs, original);
+        tangents[copy] = finished(sums[weld[original]][side], mesh.normals[original], side == 1);
       }
       index = copy;
     }
@@ -139,7 +144,7 @@ void generateTangents(TriangleMesh& mesh, const std::vector<Vec2>& uv) {
   // Vertices that only triangles without texture space use: any frame will do.
   for (size_t v = 0; v < originals; ++v) {
     if (copies[v][0] == kNobody && copies[v][1] == kNobody)
-      mesh.tangents[v] = finished(glm::dvec3(0), mesh.normals[v], false);
+      tangents[v] = finished(glm::dvec3(0), mesh.normals[v], false);
   }
 }
 

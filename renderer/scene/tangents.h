@@ -8,8 +8,8 @@
 
 namespace braid {
 
-// Fills mesh.tangents from positions, normals and `uv` (one per vertex). A vertex where mirrored and unmirrored texture
-// space meet is duplicated.
-void generateTangents(TriangleMesh& mesh, const std::vector<Vec2>& uv);
+// Fills frame 0 (mesh.tangents), 1 or 2 (mesh.otherTangents) from positions, normals and uv[frame] (one per vertex). A
+// vertex where mirrored and unmirrored texture space meet is duplicated, in the mesh and in every list of `uv`.
+void generateTangents(TriangleMesh& mesh, size_t frame, std::vector<std::vector<Vec2>>& uv);
 
 }  // namespace braid

@@ -37,6 +37,21 @@ Frame tangentFrame(const Vec3& normal, const Vec4& tangent) {
   return Frame(s, glm::cross(normal, s) * (tangent.w < 0 ? -1.0f : 1.0f), normal);
 }
 
+// A tangent of the mesh at a hit, in the world.
+Vec4 tangentAt(const Scene& scene, const std::vector<Vec4>& tangents, const Hit& hit) {
+  const Vec4 tangent = interpolate(tangents, hit.mesh->triangles[hit.triangle], hit.u, hit.v);
+  if (hit.instance == kNoInstance) return tangent;
+  const Mat3 linear(scene.instances()[hit.instance].toWorld);
+  return Vec4(linear * Vec3(tangent), glm::determinant(linear) < 0 ? -tangent.w : tangent.w);
+}
+
+// Tangents of the frame that a texture of the material follows (Material::coatFrame), if they are others than those of
+// the shading frame.
+const std::vector<Vec4>* otherTangents(const TriangleMesh& mesh, uint8_t frame) {
+  if (frame == 0 || mesh.otherTangents[frame - 1].empty()) return nullptr;
+  return &mesh.otherTangents[frame - 1];
+}
+
 }  // namespace
 
 void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit& hit) {
@@ -150,7 +165,13 @@ void evaluateLayers(const Scene& scene, const Hit& hit, SurfaceParameters& s) {
     s.clearcoatRoughness =
         m.clearcoatRoughness * (m.clearcoatRoughnessTexture ? tex(m.clearcoatRoughnessTexture).g : 1.0f);
     Vec3 coat = hit.smoothNormal;
-    if (m.clearcoatNormalTexture && !hit.mesh->tangents.empty()) {
+    if (const auto* tangents = otherTangents(*hit.mesh, m.coatFrame); tangents && m.clearcoatNormalTexture) {
+      const Vec3 front = hit.front ? hit.smoothNormal : -hit.smoothNormal;
+      const Frame f = tangentFrame(front, tangentAt(scene, *tangents, hit));
+      const Vec3 local = mapNormal(tex(m.clearcoatNormalTexture), m.clearcoatNormalScale);
+      const Vec3 mapped = hit.front ? f.toWorld(local) : Frame(f.s, -f.t, -f.n).toWorld(local);
+      if (glm::dot(mapped, hit.ng) > 1e-3f) coat = mapped;
+    } else if (m.clearcoatNormalTexture && !hit.mesh->tangents.empty()) {
       const Frame smooth(hit.frame.s - hit.smoothNormal * glm::dot(hit.frame.s, hit.smoothNormal), Vec3(0),
                          hit.smoothNormal);
       const Vec3 t = glm::normalize(smooth.s);
@@ -178,8 +199,13 @@ void evaluateLayers(const Scene& scene, const Hit& hit, SurfaceParameters& s) {
     direction = Vec2(c * direction.x - si * direction.y, si * direction.x + c * direction.y);
     const float length = glm::length(direction);
     s.anisotropyDirection = length > 0 ? direction / length : Vec2(1, 0);
-    // The frame's bitangent is turned on back faces.
-    if (!hit.front) s.anisotropyDirection.y = -s.anisotropyDirection.y;
+    if (const auto* tangents = otherTangents(*hit.mesh, m.anisotropyFrame)) {
+      const Frame f = tangentFrame(hit.front ? hit.frame.n : -hit.frame.n, tangentAt(scene, *tangents, hit));
+      const Vec2 d = s.anisotropyDirection;
+      s.anisotropyDirection = Vec2(hit.frame.toLocal(d.x * f.s + d.y * f.t));
+    } else if (!hit.front) {
+      s.anisotropyDirection.y = -s.anisotropyDirection.y;  // the frame's bitangent is turned on back faces
+    }
   }
   if (s.lobes & kLobeIridescence) {
     s.iridescence = m.iridescence * (m.iridescenceTexture ? tex(m.iridescenceTexture).r : 1.0f);
