@@ -31,6 +31,7 @@ float punctualPower(const PunctualLight& light) {
 LightBounds boundsOf(const PunctualLight& light) {
   LightBounds b;
   b.bounds.extend(light.position);
+  b.range = light.range;
   b.axis = light.direction;
   // A point light has normals everywhere; a spot only within its cone. Power as if the cone were a full sphere:
   // importance is per direction.
@@ -161,9 +162,8 @@ bool LightSampler::samplePunctual(const PunctualLight& light, const Vec3& p, Lig
   const float distance2 = glm::dot(d, d);
   if (!(distance2 > 0)) return false;
   out.distance = std::sqrt(distance2);
-  if (out.distance > light.range) return false;
   out.wi = d / out.distance;
-  out.radiance = light.intensity / distance2;
+  out.radiance = light.intensity * (rangeWindow(light, out.distance) / distance2);
   if (light.kind == PunctualKind::Spot) out.radiance *= spotFalloff(light, -glm::dot(out.wi, light.direction));
   out.pdfW = 1;
   out.delta = true;

@@ -3,6 +3,7 @@
 // then punctual lights with a position, directional lights, the environment.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "renderer/core/vec.h"
@@ -78,6 +79,13 @@ class LightSampler {
   std::vector<float> directionalCumulative_;
   float probabilityFinite_ = 0, probabilityDirectional_ = 0, probabilityEnvironment_ = 0;
 };
+
+// What the range of a light leaves of it at a distance, in [0, 1]: the window of KHR_lights_punctual, which ends
+// without an edge. The distance is that of the straight way from the light to the first surface that scatters.
+inline float rangeWindow(const PunctualLight& light, float distance) {
+  if (!(light.range < kInfinity)) return 1;
+  return std::max(1 - sqr(sqr(distance / light.range)), 0.0f);
+}
 
 // Spot attenuation of KHR_lights_punctual for the cosine between the axis and the direction from the light, in [0, 1].
 float spotFalloff(const PunctualLight& light, float cosAngle);

@@ -39,6 +39,7 @@ LightBounds merge(const LightBounds& a, const LightBounds& b) {
   LightBounds m = a;
   m.bounds.extend(b.bounds);
   m.power = a.power + b.power;
+  m.range = std::max(a.range, b.range);
   m.twoSided = a.twoSided || b.twoSided;
   m.cosEmission = std::min(a.cosEmission, b.cosEmission);
   unionCones(m.axis, m.cosNormals, b.axis, b.cosNormals);
@@ -152,6 +153,7 @@ LightBounds LightTree::buildNode(std::vector<uint32_t>& order, size_t begin, siz
   n.radius = 0.5f * glm::length(total.bounds.diagonal());
   n.axis = total.axis;
   n.power = total.power;
+  n.range = total.range;
   n.cosNormals = total.cosNormals;
   n.cosEmission = total.cosEmission;
   n.twoSided = total.twoSided;
@@ -188,6 +190,11 @@ float LightTree::importance(const Node& node, const Vec3& p, const Vec3& n, bool
   if (cosEmit <= node.cosEmission) return 0;
   // Slack on both cosines: rounding must not turn a light that contributes a little into one that is never chosen.
   float value = node.power * std::max(cosEmit, 1e-4f) / clamped2;
+  if (node.range < kInfinity) {
+    const float part = (std::sqrt(distance2) - node.radius) / node.range;
+    if (part > 1 + 1e-5f) return 0;
+    value *= std::max(1 - sqr(sqr(part)), 1e-4f);
+  }
   if (n != Vec3(0)) {
     float cosReceive = -glm::dot(w, n);
     if (twoSided) cosReceive = std::abs(cosReceive);

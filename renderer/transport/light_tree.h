@@ -18,9 +18,10 @@ namespace braid {
 struct LightBounds {
   Bounds bounds;
   Vec3 axis{0, 0, 1};
-  float cosNormals = 1;   // cosine of the half angle of the cone of its normals about the axis
-  float cosEmission = 0;  // cosine of the angle beyond the normals within which it emits
-  float power = 0;        // W, channel average
+  float cosNormals = 1;     // cosine of the half angle of the cone of its normals about the axis
+  float cosEmission = 0;    // cosine of the angle beyond the normals within which it emits
+  float power = 0;          // W, channel average
+  float range = kInfinity;  // metres, as rangeWindow()
   bool twoSided = false;
 };
 
@@ -42,6 +43,7 @@ class LightTree {
     float radius;
     Vec3 axis;
     float power;
+    float range;
     float cosNormals, cosEmission;
     uint32_t leftLeaves;  // leaves of the left child (which follows the node); 0: a leaf
     uint32_t light;       // of a leaf

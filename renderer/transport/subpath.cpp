@@ -129,13 +129,7 @@ SubpathBatch::Arrival SubpathBatch::arrive(SubpathState& state, const Hit& hit) 
   state.travelled += hit.distance;
   const MaterialSummary& material = context_.summaryOf(hit);
   if (settings_.transport == Transport::Power) {
-    const uint32_t light = state.light;
-    const bool positional =
-        light >= context_.lights.firstPositional() && light < context_.lights.firstDirectional() && state.segments == 1;
-    if (positional && glm::length(hit.position - context_.lights.positional(light).position) >
-                          context_.lights.positional(light).range)
-      return Arrival::End;
-    if (material.unlit) return Arrival::End;
+    if (material.unlit || !applyRange(state, hit)) return Arrival::End;
   }
   if (settings_.mis) {
     const double cosine = geometricCosine(hit, hit.wo);
@@ -161,6 +155,21 @@ SubpathBatch::Arrival SubpathBatch::arrive(SubpathState& state, const Hit& hit) 
   if (material.volume && crossNullInterface(state, hit))
     return state.nullCrossings < kMaxNullCrossings ? Arrival::Null : Arrival::End;
   return Arrival::Vertex;
+}
+
+// The window of a light with a range: light samples count the whole straight way to a receiver, also through panes and
+// null interfaces, so walks that go straight on replace what they have counted before. False: beyond the range.
+bool SubpathBatch::applyRange(SubpathState& state, const Hit& hit) const {
+  const LightSampler& lights = context_.lights;
+  if (!state.straight || state.light < lights.firstPositional() || state.light >= lights.firstDirectional())
+    return true;
+  const PunctualLight& light = lights.positional(state.light);
+  if (!(light.range < kInfinity)) return true;
+  const float window = rangeWindow(light, glm::length(hit.position - light.position));
+  if (!(window > 0)) return false;
+  state.throughput *= window / state.window;
+  state.window = window;
+  return true;
 }
 
 // As in the path tracer: inside of a solid that rules there, another solid's surface scatters nothing.
@@ -237,6 +246,7 @@ bool SubpathBatch::scatter(SubpathState& state, const SubpathVertex& vertex) con
   state.lastPdfW = sample.pdfW;
   state.lightCouldNotBeSampled = sample.delta;
   state.deltaOnly = state.deltaOnly && sample.delta;
+  state.straight = state.straight && sample.delta && sample.transmitted && hit.material->thinWalled;
   if (!sample.delta) state.leastPdfW = std::min(state.leastPdfW, sample.pdfW);
 
   const float relative = maxComponent(state.throughput) / (state.startThroughput * state.etaScale);

@@ -100,6 +100,8 @@ struct SubpathState {
   uint32_t light = 0;  // where a light subpath started
   float pdfEmit = 0, cosLight = 1;
   bool deltaLight = false;
+  bool straight = true;  // since the light: windows count the distance from there
+  float window = 1;      // rangeWindow() as far as the throughput has it
 };
 
 // Value of a vertex's BSDF toward the unit world direction `wi`; f is zero where nothing can be.
@@ -137,6 +139,7 @@ class SubpathBatch {
   void trace(int active);
   // Brings the walk to a hit: attenuation and the quantities' conversion to area.
   Arrival arrive(SubpathState& state, const Hit& hit) const;
+  bool applyRange(SubpathState& state, const Hit& hit) const;
   void finishVertex(const SubpathState& state, const Hit& hit, SubpathVertex& vertex) const;
   bool scatter(SubpathState& state, const SubpathVertex& vertex) const;
   bool crossNullInterface(SubpathState& state, const Hit& hit) const;
