@@ -45,10 +45,10 @@ EnvironmentTest testEnvironment(const Environment& environment, int width, int h
   const double area = static_cast<double>(2 * kPi * kPi) / (columns * rows);
   for (int y = 0; y < rows; ++y)
     for (int x = 0; x < columns; ++x) {
-      // The image's centre lies at -Z; longitude grows to its right, toward +X.
+      // The image's centre lies at +X; longitude grows to its right, toward +Z.
       const float theta = kPi * (static_cast<float>(y) + 0.5f) / static_cast<float>(rows);
       const float phi = 2 * kPi * ((static_cast<float>(x) + 0.5f) / static_cast<float>(columns) - 0.5f) - rotation;
-      const Vec3 w(std::sin(theta) * std::sin(phi), std::cos(theta), -std::sin(theta) * std::cos(phi));
+      const Vec3 w(std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi));
       const double share = static_cast<double>(environment.pdfW(w) * std::sin(theta)) * area;
       expected[static_cast<size_t>(y * columns + x)] = share * count;
       result.integral += share;
@@ -56,7 +56,7 @@ EnvironmentTest testEnvironment(const Environment& environment, int width, int h
   for (int i = 0; i < count; ++i) {
     Vec3 w;
     if (!(environment.sample(rng.next2(), w) > 0)) continue;
-    const float turn = (std::atan2(w.x, -w.z) + rotation) / (2 * kPi) + 0.5f;
+    const float turn = (std::atan2(w.z, w.x) + rotation) / (2 * kPi) + 0.5f;
     const int x = static_cast<int>((turn - std::floor(turn)) * static_cast<float>(columns));
     const int y = static_cast<int>(std::acos(std::clamp(w.y, -1.0f, 1.0f)) / kPi * static_cast<float>(rows));
     observed[static_cast<size_t>(std::min(y, rows - 1) * columns + std::min(x, columns - 1))] += 1;
@@ -128,6 +128,27 @@ TEST_CASE("A black environment is never drawn, and a rotated one turns about the
   CHECK(luminance(still.radiance(w)) > 0);
   CHECK(turned.radiance(moved).x == doctest::Approx(still.radiance(w).x).epsilon(1e-3));
   CHECK(turned.pdfW(moved) == doctest::Approx(still.pdfW(w)).epsilon(1e-3));
+}
+
+TEST_CASE("An environment lies as in three.js and in Blender: its centre in +X, its right in +Z, its top in +Y") {
+  const auto only = [](int column, int row) {
+    return Environment(
+        environmentImage(8, 4, [=](int x, int y) { return Spectrum(x == column && y == row ? 1.0f : 0.0f); }));
+  };
+  // The middle of texel (x, y) of 8 x 4: u = atan2(z, x) / 2 pi + 1/2, v = acos(y) / pi.
+  const auto middle = [](int x, int y) {
+    const float phi = 2 * kPi * ((static_cast<float>(x) + 0.5f) / 8 - 0.5f),
+                theta = kPi * (static_cast<float>(y) + 0.5f) / 4;
+    return Vec3(std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi));
+  };
+  for (const auto& [x, y] : {std::pair(4, 1), std::pair(6, 2), std::pair(0, 0), std::pair(2, 3)}) {
+    CHECK(only(x, y).radiance(middle(x, y)).x == doctest::Approx(1).epsilon(1e-4));
+    CHECK(only(x, y).radiance(-middle(x, y)).x == 0);
+  }
+  // Half a texel around: bright between +X and +Z, right of the centre.
+  CHECK(only(4, 2).radiance(glm::normalize(Vec3(1, -0.4f, 0.3f))).x > 0.5f);
+  CHECK(only(5, 1).radiance(glm::normalize(Vec3(0.3f, 0.4f, 1))).x > 0.5f);
+  CHECK(only(5, 1).radiance(glm::normalize(Vec3(0.3f, 0.4f, -1))).x == 0);
 }
 
 TEST_CASE("A sun of one texel takes almost all samples and its neighbourhood keeps the rest") {

@@ -32,7 +32,7 @@ Environment::Environment(const EnvironmentData& data) : image_(data.image), scal
   buildDistribution();
 }
 
-// The angle φ grows to the right of the image; its centre (φ = π) is -Z and its upper edge +Y.
+// The angle φ grows to the right of the image, from +X in its centre (φ = 0) toward +Z; its upper edge is +Y.
 Vec3 Environment::toLocal(const Vec3& d) const {
   return {cosRotation_ * d.x - sinRotation_ * d.z, d.y, sinRotation_ * d.x + cosRotation_ * d.z};
 }
@@ -111,7 +111,7 @@ void Environment::buildDistribution() {
 Spectrum Environment::radiance(const Vec3& direction) const {
   if (!image_) return scale_;
   const Vec3 d = toLocal(direction);
-  const float phi = std::atan2(d.x, -d.z);  // 0 at -Z, growing toward +X
+  const float phi = std::atan2(d.z, d.x);
   const float theta = std::acos(std::clamp(d.y, -1.0f, 1.0f));
   const float x = (0.5f + phi * 0.5f * kInvPi) * static_cast<float>(width_) - 0.5f;
   const float y = theta * kInvPi * static_cast<float>(height_) - 0.5f;
@@ -137,7 +137,7 @@ float Environment::sample(Vec2 u, Vec3& direction) const {
   const float theta = kPi * (static_cast<float>(y) + fy) / static_cast<float>(height_);
   const float phi = 2 * kPi * ((static_cast<float>(x) + fx) / static_cast<float>(width_) - 0.5f);
   const float sinTheta = std::sin(theta);
-  direction = toWorld({sinTheta * std::sin(phi), std::cos(theta), -sinTheta * std::cos(phi)});
+  direction = toWorld({sinTheta * std::cos(phi), std::cos(theta), sinTheta * std::sin(phi)});
   return pdfW(direction);
 }
 
@@ -145,7 +145,7 @@ float Environment::pdfW(const Vec3& direction) const {
   if (isBlack(average_)) return 0;
   if (!image_) return 0.25f * kInvPi;
   const Vec3 d = toLocal(direction);
-  const float phi = std::atan2(d.x, -d.z);
+  const float phi = std::atan2(d.z, d.x);
   const float theta = std::acos(std::clamp(d.y, -1.0f, 1.0f));
   const float sinTheta = safeSqrt(1 - d.y * d.y);
   if (!(sinTheta > 0)) return 0;
