@@ -242,6 +242,42 @@ TEST_CASE("A scene without triangles shows its environment") {
   }
 }
 
+TEST_CASE("A mesh pressed flat by its transform is drawn, alone and among other placements") {
+  const Mat4 flat = glm::translate(Mat4(1), Vec3(0, 0, 7)) * glm::scale(Mat4(1), Vec3(1, 2, 0));
+  for (const bool repeated : {false, true}) {
+    TriangleMesh sphere;
+    addSphere(sphere, {0, 0, 0}, 1, 3);
+    SceneData data = oneMesh(std::move(sphere), singleSided(diffuseMaterial(Spectrum(0.5f), Spectrum(1))));
+    data.instances[0].toWorld = flat;
+    if (repeated) {
+      data.instances.push_back({0, glm::translate(Mat4(1), Vec3(50, 0, 0))});
+      data.instances.push_back({0, glm::translate(Mat4(1), Vec3(60, 0, 0))});
+    }
+    const Scene scene(std::move(data));
+    CAPTURE(repeated);
+    CHECK(scene.bounds().lo.z == (repeated ? -1 : 7));
+    Rng rng(3);
+    for (int i = 0; i < 200; ++i) {
+      const Vec3 to(0.9f * randomPoint(rng).x, 1.2f * randomPoint(rng).y, 7),
+          from = 5.0f * randomPoint(rng) + Vec3(0, 0, 7);
+      const bool inside = sqr(to.x) + sqr(to.y / 2) < 0.95f;
+      if (!inside || std::abs(from.z - 7) < 0.1f) continue;
+      const Vec3 direction = glm::normalize(to - from);
+      const RayHit query = intersect(scene, from, direction);
+      REQUIRE(query.t < kInfinity);
+      Hit hit;
+      makeHit(scene, query, direction, hit);
+      CHECK(hit.position.z == doctest::Approx(7));
+      CHECK(hit.front);  // of its two sides the one that faces the ray
+      CHECK(std::abs(hit.frame.n.z) == doctest::Approx(1));
+    }
+    double area = 0;
+    for (const EmissiveTriangle& e : scene.emitters())
+      if (e.normal.z > 0.999f && e.p0.z == 7) area += static_cast<double>(e.area);
+    CHECK(area == doctest::Approx(2 * 3.14159).epsilon(0.02));
+  }
+}
+
 TEST_CASE("Camera rays pass the back of an open single-sided surface, all others meet it from both sides") {
   Mat4 mirror(1);
   mirror[0][0] = -1;

@@ -7,6 +7,7 @@
 #include <new>
 
 #include "renderer/core/error.h"
+#include "renderer/scene/coincident.h"
 
 #if RTC_VERSION_MAJOR >= 4
 #define BRAID_EMBREE4 1
@@ -38,7 +39,31 @@ RTCRay singleRay(const RayQuery& r) {
   return ray;
 }
 
+bool isBackFace(const RTCFilterFunctionNArguments* args, unsigned i) {
+  const Vec3 direction(RTCRayN_dir_x(args->ray, args->N, i), RTCRayN_dir_y(args->ray, args->N, i),
+                       RTCRayN_dir_z(args->ray, args->N, i));
+  const Vec3 ng(RTCHitN_Ng_x(args->hit, args->N, i), RTCHitN_Ng_y(args->hit, args->N, i),
+                RTCHitN_Ng_z(args->hit, args->N, i));
+  // TRAP: inside an instance both the ray and Ng are in object space here; the sign is the same in world space,
+  // mirrored or not, because normals transform by the inverse transpose.
+  return glm::dot(direction, ng) > 0;
+}
+
+// Beside a mesh's own filter.
+void rejectBackFaces(const RTCFilterFunctionNArguments* args) {
+  for (unsigned i = 0; i < args->N; ++i)
+    if (args->valid[i] == -1 && isBackFace(args, i)) args->valid[i] = 0;
+}
+
 #ifdef BRAID_EMBREE4
+constexpr RTCSceneFlags kQueryFilters = RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS;
+void embreeIntersectFacing(RTCScene scene, RTCRayHit& q) {
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.filter = rejectBackFaces;
+  arguments.flags = RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
+  rtcIntersect1(scene, &q, &arguments);
+}
 void embreeIntersect1(RTCScene scene, RTCRayHit& q) { rtcIntersect1(scene, &q, nullptr); }
 void embreeOccluded1(RTCScene scene, RTCRay& q) { rtcOccluded1(scene, &q, nullptr); }
 void embreeIntersect8(const int* valid, RTCScene scene, RTCRayHit8& q) { rtcIntersect8(valid, scene, &q, nullptr); }
@@ -48,6 +73,12 @@ RTCIntersectContext plainContext() {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   return context;
+}
+constexpr RTCSceneFlags kQueryFilters = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
+void embreeIntersectFacing(RTCScene scene, RTCRayHit& q) {
+  RTCIntersectContext context = plainContext();
+  context.filter = rejectBackFaces;
+  rtcIntersect1(scene, &context, &q);
 }
 void embreeIntersect1(RTCScene scene, RTCRayHit& q) {
   RTCIntersectContext context = plainContext();
@@ -94,7 +125,8 @@ void Accel::checkError(const char* doing) const {
 RTCScene Accel::newScene() const {
   RTCScene scene = rtcNewScene(device_);
   rtcSetSceneBuildQuality(scene, highQuality_ ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
-  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);  // watertight
+  const auto watertight = RTC_SCENE_FLAG_ROBUST;
+  rtcSetSceneFlags(scene, coincident_ ? static_cast<RTCSceneFlags>(watertight | kQueryFilters) : watertight);
   return scene;
 }
 
@@ -129,6 +161,7 @@ void Accel::build(const AccelInput& input, const HitFilter* filter) {
   isa_ = input.isa.empty() ? "default" : input.isa;
   rtcSetDeviceMemoryMonitorFunction(device_, countMemory, &bytes);
   filter_ = filter;
+  coincident_ = input.coincident && input.coincident->any() ? input.coincident : nullptr;
   highQuality_ = input.highQuality;
   packets_ = rtcGetDeviceProperty(device_, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0;
   worldMeshes_ = *input.worldMeshes;
@@ -190,6 +223,7 @@ void Accel::intersect(RayBatch& rays, int count, RayHit* hits) const {
       hit.v = query.hit.v[i];
       hit.triangle = query.hit.primID[i];
       resolve(query.hit.geomID[i], query.hit.instID[0][i], hit);
+      if (coincident_) preferFacing(rays.get(first + i), hit);
     }
   }
 }
@@ -206,6 +240,22 @@ void Accel::intersectSingle(const RayQuery& ray, RayHit& hit) const {
   hit.v = query.hit.v;
   hit.triangle = query.hit.primID;
   resolve(query.hit.geomID, query.hit.instID[0], hit);
+  if (coincident_) preferFacing(ray, hit);
+}
+
+void Accel::preferFacing(const RayQuery& ray, RayHit& hit) const {
+  const float reach = coincident_->reach(ray, hit);
+  if (!(reach > 0)) return;
+  RTCRayHit query;
+  query.ray = singleRay(ray);
+  query.ray.tnear = std::max(0.0f, hit.t - reach);
+  query.ray.tfar = hit.t + reach;
+  query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  embreeIntersectFacing(scene_, query);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
+  RayHit found{query.ray.tfar, query.hit.u, query.hit.v, 0, query.hit.primID};
+  resolve(query.hit.geomID, query.hit.instID[0], found);
+  if (coincident_->pairs(hit, found)) hit = found;
 }
 
 void Accel::occluded(ShadowBatch& rays, int count, bool* results) const {
@@ -231,15 +281,9 @@ void Accel::filterCallback(const RTCFilterFunctionNArguments* args) {
   const auto* data = static_cast<const FilterData*>(args->geometryUserPtr);
   for (unsigned i = 0; i < args->N; ++i) {
     if (args->valid[i] != -1) continue;
-    const Vec3 direction(RTCRayN_dir_x(args->ray, args->N, i), RTCRayN_dir_y(args->ray, args->N, i),
-                         RTCRayN_dir_z(args->ray, args->N, i));
-    const Vec3 ng(RTCHitN_Ng_x(args->hit, args->N, i), RTCHitN_Ng_y(args->hit, args->N, i),
-                  RTCHitN_Ng_z(args->hit, args->N, i));
-    // TRAP: inside an instance both the ray and Ng are in object space here; the sign is the same in world space,
-    // mirrored or not, because normals transform by the inverse transpose.
-    const bool backFace = glm::dot(direction, ng) > 0;
     if (data->filter->passThrough(data->mesh, RTCHitN_primID(args->hit, args->N, i), RTCHitN_u(args->hit, args->N, i),
-                                  RTCHitN_v(args->hit, args->N, i), backFace, RTCRayN_id(args->ray, args->N, i)))
+                                  RTCHitN_v(args->hit, args->N, i), isBackFace(args, i),
+                                  RTCRayN_id(args->ray, args->N, i)))
       args->valid[i] = 0;
   }
 }

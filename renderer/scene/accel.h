@@ -96,6 +96,8 @@ struct GroupInstance {
   Mat4 toObject{1};
 };
 
+class CoincidentFaces;
+
 struct AccelInput {
   const std::vector<TriangleMesh>* meshes = nullptr;
   const std::vector<uint8_t>* filtered = nullptr;  // per mesh: needs the any-hit filter
@@ -104,6 +106,7 @@ struct AccelInput {
   const std::vector<GroupInstance>* instances = nullptr;
   std::string isa;          // e.g. "avx2"; empty: Embree's choice
   bool highQuality = true;  // spatial splits
+  const CoincidentFaces* coincident = nullptr;
 };
 
 // Decides whether a ray passes through a candidate hit (alpha, culled back faces). `salt` makes stochastic decisions
@@ -141,6 +144,8 @@ class Accel {
   RTCScene newScene() const;
   void attachMesh(RTCScene scene, uint32_t mesh, const AccelInput& input);
   void intersectSingle(const RayQuery& ray, RayHit& hit) const;
+  // Replaces a hit from behind by that of a face in the same place that faces the ray.
+  void preferFacing(const RayQuery& ray, RayHit& hit) const;
   void resolve(uint32_t geometry, uint32_t instance, RayHit& hit) const;
   void checkError(const char* doing) const;
 
@@ -148,6 +153,7 @@ class Accel {
   RTCScene scene_ = nullptr;
   std::vector<RTCScene> groupScenes_;
   const HitFilter* filter_ = nullptr;
+  const CoincidentFaces* coincident_ = nullptr;
   size_t bytes_ = 0;
   std::string isa_;
   bool highQuality_ = true;

@@ -31,7 +31,7 @@ bool isClosedOutward(const TriangleMesh& mesh) {
   const std::vector<uint32_t> id = weldPositions(mesh.positions);
   std::vector<uint64_t> edges;
   edges.reserve(mesh.triangles.size() * 3);
-  double volume = 0;
+  double volume = 0, area = 0, largest = 0;
   for (const glm::uvec3& t : mesh.triangles) {
     const uint32_t v[3] = {id[t.x], id[t.y], id[t.z]};
     if (v[0] == v[1] || v[1] == v[2] || v[2] == v[0]) continue;
@@ -39,12 +39,16 @@ bool isClosedOutward(const TriangleMesh& mesh) {
     const glm::dvec3 a(mesh.positions[t.x] - mesh.positions[0]), b(mesh.positions[t.y] - mesh.positions[0]),
         c(mesh.positions[t.z] - mesh.positions[0]);
     volume += glm::dot(a, glm::cross(b, c));
+    area += glm::length(glm::cross(b - a, c - a));
   }
+  for (const Vec3& p : mesh.positions) largest = std::max(largest, static_cast<double>(maxComponent(magnitudes(p))));
   std::sort(edges.begin(), edges.end());
   if (edges.empty() || std::adjacent_find(edges.begin(), edges.end()) != edges.end()) return false;
   for (uint64_t e : edges)
     if (!std::binary_search(edges.begin(), edges.end(), e << 32 | e >> 32)) return false;
-  return volume > 0;
+  // Thinner than its coordinates are rounded, it is two faces back to back, of which rays may meet either.
+  constexpr double kRounding = 8 * static_cast<double>(std::numeric_limits<float>::epsilon());
+  return volume > kRounding * largest * area;
 }
 
 }  // namespace braid

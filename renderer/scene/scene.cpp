@@ -9,36 +9,9 @@
 #include "renderer/core/parallel.h"
 #include "renderer/core/stopwatch.h"
 #include "renderer/scene/closed_mesh.h"
+#include "renderer/scene/placement.h"
 
 namespace braid {
-
-namespace {
-
-// Bakes a transform into a mesh. Normals go by the inverse transpose; a mirrored mesh has its winding turned so that
-// the cross product of the edges keeps pointing to the front.
-void transformMesh(TriangleMesh& mesh, const Mat4& toWorld) {
-  if (toWorld == Mat4(1)) return;
-  const Mat3 linear(toWorld);
-  const Mat3 normalMatrix = glm::transpose(glm::inverse(linear));
-  const bool mirrored = glm::determinant(linear) < 0;
-  parallelChunks(mesh.positions.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) mesh.positions[i] = Vec3(toWorld * Vec4(mesh.positions[i], 1));
-  });
-  for (Vec3& n : mesh.normals) {
-    const Vec3 transformed = normalMatrix * n;
-    const float length = glm::length(transformed);
-    if (length > 0) n = transformed / length;
-  }
-  for (Vec4& t : mesh.tangents) {
-    const Vec3 transformed = linear * Vec3(t);
-    const float length = glm::length(transformed);
-    if (length > 0) t = Vec4(transformed / length, mirrored ? -t.w : t.w);
-  }
-  if (mirrored)
-    for (glm::uvec3& t : mesh.triangles) std::swap(t.y, t.z);
-}
-
-}  // namespace
 
 Scene::Scene(SceneData data, const SceneOptions& options) : data_(std::move(data)) {
   const Stopwatch preparing;
@@ -59,6 +32,8 @@ Scene::Scene(SceneData data, const SceneOptions& options) : data_(std::move(data
   input.instances = &instances_;
   input.isa = options.isa;
   input.highQuality = options.highQuality.value_or(traits_.triangles <= 4'000'000);
+  coincident_.emplace(input, reachableBacks_, opaque_);
+  input.coincident = &*coincident_;
   const bool anyFilter = std::any_of(filtered_.begin(), filtered_.end(), [](uint8_t f) { return f != 0; });
   accel_.build(input, anyFilter ? this : nullptr);
   times_.hierarchy = building.seconds();
@@ -72,10 +47,25 @@ void Scene::addDefaultLight(const Spectrum& radiance, const std::string& warning
   traits_.flags |= kTraitEnvironment;
 }
 
+// A mesh that one of several placements flattens cannot be an instance there, because rays could not be brought into
+// its coordinates: it gets a copy of its own.
+void Scene::separateFlattened() {
+  std::vector<uint32_t> count(data_.meshes.size(), 0);
+  for (const MeshInstance& i : data_.instances) ++count[i.mesh];
+  for (MeshInstance& i : data_.instances) {
+    if (i.mesh >= count.size() || count[i.mesh] == 1 || shapeOf(glm::dmat4(i.toWorld)) == Shape::Solid) continue;
+    --count[i.mesh];
+    TriangleMesh copy = data_.meshes[i.mesh];
+    i.mesh = static_cast<uint32_t>(data_.meshes.size());
+    data_.meshes.push_back(std::move(copy));
+  }
+}
+
 // Meshes placed once are baked into world space, which spares every ray the instance transform; meshes placed several
 // times keep one copy. Meshes with the same list of placements form a group, so that a tree's trunk and leaves are one
 // instance.
 void Scene::placeMeshes() {
+  separateFlattened();
   std::vector<std::vector<size_t>> placements(data_.meshes.size());
   for (size_t i = 0; i < data_.instances.size(); ++i) placements[data_.instances[i].mesh].push_back(i);
 
@@ -127,11 +117,16 @@ void Scene::placeMeshes() {
 // single-sided surface. A closed outward-facing surface is never seen from behind, so its back faces need no culling.
 void Scene::markFilteredMeshes(bool full) {
   filtered_.assign(data_.meshes.size(), 0);
+  reachableBacks_ = opaque_ = filtered_;
   parallelFor(data_.meshes.size(), [&](size_t m) {
     const TriangleMesh& mesh = data_.meshes[m];
     const Material& material = data_.materials[mesh.material];
-    const bool culled = !material.doubleSided && !material.transmissive() && material.diffuseTransmission == 0;
-    filtered_[m] = full || material.alphaMode != AlphaMode::Opaque || (culled && !isClosedOutward(mesh));
+    opaque_[m] = !material.transmissive() && material.diffuseTransmission == 0;
+    const bool culled = !material.doubleSided && opaque_[m];
+    const bool open = culled && !isClosedOutward(mesh);
+    filtered_[m] = full || material.alphaMode != AlphaMode::Opaque || open;
+    // Lamps that shine to both sides stay seen from both: light samples cannot tell what covers one.
+    reachableBacks_[m] = open || (material.doubleSided && !material.emissive());
   });
 }
 
@@ -255,7 +250,8 @@ size_t Scene::geometryBytes() const {
   size_t bytes = instances_.size() * sizeof(GroupInstance) + emitters_.size() * sizeof(EmissiveTriangle);
   for (const TriangleMesh& m : data_.meshes)
     bytes += m.positions.capacity() * sizeof(Vec3) + m.triangles.capacity() * sizeof(glm::uvec3) +
-             m.normals.capacity() * sizeof(Vec3) + m.tangents.capacity() * sizeof(Vec4) +
+             m.normals.capacity() * sizeof(Vec3) +
+             (m.tangents.capacity() + m.otherTangents[0].capacity() + m.otherTangents[1].capacity()) * sizeof(Vec4) +
              (m.uv[0].capacity() + m.uv[1].capacity()) * sizeof(Vec2) + m.colors.capacity() * sizeof(Vec4);
   return bytes;
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "renderer/scene/accel.h"
+#include "renderer/scene/coincident.h"
 #include "renderer/scene/emitters.h"
 #include "renderer/scene/environment.h"
 #include "renderer/scene/scene_data.h"
@@ -72,6 +73,7 @@ class Scene : private HitFilter {
 
  private:
   bool passThrough(uint32_t mesh, uint32_t triangle, float u, float v, bool backFace, uint32_t salt) const override;
+  void separateFlattened();
   void placeMeshes();
   void markFilteredMeshes(bool full);
   void collectEmitters();
@@ -83,7 +85,9 @@ class Scene : private HitFilter {
   std::vector<uint32_t> worldMeshes_;
   std::vector<MeshGroup> groups_;
   std::vector<GroupInstance> instances_;
-  std::vector<uint8_t> filtered_;  // per mesh
+  std::vector<uint8_t> filtered_;        // per mesh
+  std::vector<uint8_t> reachableBacks_;  // per mesh: rays may meet its back faces
+  std::vector<uint8_t> opaque_;          // per mesh: no light passes its surface, but through holes
   std::vector<EmissiveTriangle> emitters_;
   std::vector<int64_t> meshEmitterBase_;  // per world mesh index: first emitter or -1
   std::vector<std::vector<int64_t>>
@@ -91,6 +95,7 @@ class Scene : private HitFilter {
   Bounds bounds_;
   SceneTraits traits_;
   BuildTimes times_;
+  std::optional<CoincidentFaces> coincident_;
   Accel accel_;
 };
 

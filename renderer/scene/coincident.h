@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Faces that stand back to back in one place, as exporters write both sides of a wall. Of the two a ray meets the one
+// that faces it; which one Embree reports is up to rounding and to the order of triangles.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "renderer/scene/accel.h"
+
+namespace braid {
+
+class CoincidentFaces {
+ public:
+  // Looks for opaque triangles of which another one, facing the other way, lies in the same plane. `reachable`, per
+  // mesh: whether rays may meet its back faces; `opaque`: whether no light passes its surface. Repeated meshes are
+  // compared in the world up to kMostPlaced triangles in all, beyond that only within their groups.
+  CoincidentFaces(const AccelInput& input, const std::vector<uint8_t>& reachable, const std::vector<uint8_t>& opaque);
+  static constexpr uint64_t kMostPlaced = uint64_t(1) << 24;
+
+  // Scenes without such faces pay for nothing.
+  bool any() const { return any_; }
+
+  // How far along the ray, before and behind the hit, a face in the same place may be found: what the distances of both
+  // can be off by rounding. 0: the hit faces the ray, or nothing can lie there.
+  float reach(const RayQuery& ray, const RayHit& hit) const;
+
+  // Whether what was found within reach of `back` stands back to back with it.
+  bool pairs(const RayHit& back, const RayHit& found) const;
+
+ private:
+  struct Triangle {
+    Vec3 p[3];
+    bool mirrored;
+  };
+  struct Placed {
+    uint32_t mesh;
+    Mat4 toWorld;
+    bool isWorld;
+  };
+  Triangle triangleOf(const RayHit& hit) const;
+  void look(const std::vector<Placed>& placed);
+
+  const std::vector<TriangleMesh>& meshes_;
+  const std::vector<GroupInstance>& instances_;
+  std::vector<uint8_t> reachable_, opaque_;  // per mesh
+  std::vector<std::vector<bool>> suspect_;   // per mesh, per triangle; empty: none
+  bool any_ = false;
+};
+
+}  // namespace braid
