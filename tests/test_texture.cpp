@@ -11,6 +11,7 @@
 #include <webp/encode.h>
 
 #include "renderer/core/error.h"
+#include "renderer/film/exr.h"
 #include "renderer/scene/texture.h"
 
 namespace braid::test_texture {
@@ -278,6 +279,28 @@ TEST_CASE("texture: colours are not multiplied by alpha, in any format") {
   REQUIRE(floats.size() == 8);
   for (size_t c = 0; c < 3; ++c) CHECK(floats[c] == doctest::Approx(4 * products[c]));
   CHECK(floats[3] == 0.25f);
+}
+
+TEST_CASE("texture: images to compare have the same colours as PNG and as WebP") {
+  const fs::path folder = fs::temp_directory_path();
+  const std::string stem = "braid-test-texture-" + std::to_string(::getpid());
+  const auto write = [&](const std::string& extension, const std::vector<uint8_t>& bytes) {
+    const fs::path path = folder / (stem + extension);
+    std::ofstream(path, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    ImageFile image = readImage(path);
+    fs::remove(path);
+    return image;
+  };
+  const OIIO::ImageSpec spec(2, 1, 4, OIIO::TypeDesc::UINT8);
+  const ImageFile png = write(".png", encoded(".png", spec, OIIO::TypeDesc::UINT8, kTwoTexels.data()));
+  const ImageFile webp = write(".webp", webpOf(kTwoTexels, 2, 1, -1));
+  CHECK(png.planes.at("R").at(0, 0) == doctest::Approx(fromSrgb(200 / 255.0f) * 64 / 255));
+  for (const char* c : {"R", "G", "B", "A"})
+    for (const int x : {0, 1}) {
+      // Products of eight bits.
+      CHECK(webp.planes.at(c).at(x, 0) == doctest::Approx(png.planes.at(c).at(x, 0)).epsilon(0.05));
+    }
 }
 
 TEST_CASE("texture: lossy WebP, WebP without alpha, and broken WebP") {

@@ -108,14 +108,18 @@ void readPart(const std::string& path, OIIO::ImageInput& in, int part, std::vect
   }
 }
 
-// Colours to linear, premultiplied by alpha as everything else here is.
-void linearise(const OIIO::ImageSpec& spec, std::vector<Plane<float>>& planes) {
+// Colours to linear, premultiplied by alpha as everything else here is. `multiplied`: alpha is in the encoded colours
+// already, where it does not belong.
+void linearise(const OIIO::ImageSpec& spec, bool multiplied, std::vector<Plane<float>>& planes) {
   const bool hasAlpha = spec.alpha_channel >= 0 && spec.alpha_channel < spec.nchannels;
   const Plane<float>* alpha = hasAlpha ? &planes[static_cast<size_t>(spec.alpha_channel)] : nullptr;
   for (Plane<float>& p : planes) {
     if (&p == alpha) continue;
     parallelChunks(p.size(), kPixelChunk, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) p[i] = decodeSrgb(p[i]) * (alpha ? (*alpha)[i] : 1.0f);
+      for (size_t i = begin; i < end; ++i) {
+        const float a = alpha ? (*alpha)[i] : 1.0f, colour = multiplied && a > 0 ? std::min(p[i] / a, 1.0f) : p[i];
+        p[i] = decodeSrgb(colour) * a;
+      }
     });
   }
 }
@@ -125,7 +129,8 @@ void addPart(ImageFile& file, OIIO::ImageInput& in, int part) {
   if (part > 0 && (spec.width != file.width || spec.height != file.height)) return;  // a thumbnail or a mip level
   std::vector<Plane<float>> planes(static_cast<size_t>(spec.nchannels), Plane<float>(spec.width, spec.height));
   readPart(file.path, in, part, planes);
-  if (holdsSrgb(spec)) linearise(spec, planes);
+  // OpenImageIO's WebP reader multiplies whatever it is asked for.
+  if (holdsSrgb(spec)) linearise(spec, std::string_view(in.format_name()) == "webp", planes);
   const std::string partName = spec.get_string_attribute("oiio:subimagename", "part" + std::to_string(part));
   for (int c = 0; c < spec.nchannels; ++c) {
     std::string name = spec.channel_name(c);

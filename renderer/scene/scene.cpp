@@ -53,7 +53,7 @@ void Scene::separateFlattened() {
   std::vector<uint32_t> count(data_.meshes.size(), 0);
   for (const MeshInstance& i : data_.instances) ++count[i.mesh];
   for (MeshInstance& i : data_.instances) {
-    if (i.mesh >= count.size() || count[i.mesh] == 1 || shapeOf(glm::dmat4(i.toWorld)) == Shape::Solid) continue;
+    if (count[i.mesh] == 1 || shapeOf(glm::dmat4(i.toWorld)) == Shape::Solid) continue;
     --count[i.mesh];
     TriangleMesh copy = data_.meshes[i.mesh];
     i.mesh = static_cast<uint32_t>(data_.meshes.size());

@@ -19,9 +19,8 @@ class Case:
 
     Means of unbiased integrators must agree with that of `pt` for those in
     `agree` (ALL, or names). `like` names the case whose picture this one
-    must be, times `factor`; beyond the reach of floats (`floats`) a
-    difference is only reported. `mean` is the exact answer. A refusal is
-    `code` and a line that holds `says`; with code 0 a warning holds it.
+    must be, times `factor`. `mean` is the exact answer. A refusal is `code`
+    and a line that holds `says`; with code 0 a warning holds it.
     """
     name: str
     build: typing.Callable
@@ -34,7 +33,6 @@ class Case:
     agree: tuple = ALL
     like: str = ""
     factor: float = 1.0
-    floats: bool = False
     mean: float = None
     code: int = 0
     says: str = ""
@@ -73,15 +71,12 @@ def _placement():
         yield Case(f"scale 1e{power:+d}",
                    lambda power=power: s.moved(_room, 10.0 ** power),
                    like="room", short=abs(power) == 6)
-    # Coordinates are floats: at 10^4 times its size, the room has steps of
-    # 1/1000; at 10^6, of an eighth.
     for power in (1, 2, 3, 4, 5, 6):
         yield Case(f"translated 1e{power}",
                    lambda power=power: s.moved(
                        _room, 1, (2 * 10.0 ** power, -10.0 ** power,
                                   10.0 ** power)),
-                   like="room", agree=NOT_COMPARED if power > 3 else ALL,
-                   floats=power > 3, short=power in (3, 6))
+                   like="room", short=power in (3, 6))
     yield Case("scale 1e-6, translated 1e3", lambda: s.moved(
         _room, 1e-6, (2e-3, -1e-3, 1e-3)), like="room")
 
