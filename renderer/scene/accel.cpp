@@ -49,21 +49,7 @@ bool isBackFace(const RTCFilterFunctionNArguments* args, unsigned i) {
   return glm::dot(direction, ng) > 0;
 }
 
-// Beside a mesh's own filter.
-void rejectBackFaces(const RTCFilterFunctionNArguments* args) {
-  for (unsigned i = 0; i < args->N; ++i)
-    if (args->valid[i] == -1 && isBackFace(args, i)) args->valid[i] = 0;
-}
-
 #ifdef BRAID_EMBREE4
-constexpr RTCSceneFlags kQueryFilters = RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS;
-void embreeIntersectFacing(RTCScene scene, RTCRayHit& q) {
-  RTCIntersectArguments arguments;
-  rtcInitIntersectArguments(&arguments);
-  arguments.filter = rejectBackFaces;
-  arguments.flags = RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
-  rtcIntersect1(scene, &q, &arguments);
-}
 void embreeIntersect1(RTCScene scene, RTCRayHit& q) { rtcIntersect1(scene, &q, nullptr); }
 void embreeOccluded1(RTCScene scene, RTCRay& q) { rtcOccluded1(scene, &q, nullptr); }
 void embreeIntersect8(const int* valid, RTCScene scene, RTCRayHit8& q) { rtcIntersect8(valid, scene, &q, nullptr); }
@@ -73,12 +59,6 @@ RTCIntersectContext plainContext() {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   return context;
-}
-constexpr RTCSceneFlags kQueryFilters = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
-void embreeIntersectFacing(RTCScene scene, RTCRayHit& q) {
-  RTCIntersectContext context = plainContext();
-  context.filter = rejectBackFaces;
-  rtcIntersect1(scene, &context, &q);
 }
 void embreeIntersect1(RTCScene scene, RTCRayHit& q) {
   RTCIntersectContext context = plainContext();
@@ -109,6 +89,7 @@ Accel::Accel() = default;
 
 Accel::~Accel() {
   for (RTCScene s : groupScenes_) rtcReleaseScene(s);
+  if (coincidentScene_) rtcReleaseScene(coincidentScene_);
   if (scene_) rtcReleaseScene(scene_);
   if (device_) rtcReleaseDevice(device_);
 }
@@ -125,8 +106,7 @@ void Accel::checkError(const char* doing) const {
 RTCScene Accel::newScene() const {
   RTCScene scene = rtcNewScene(device_);
   rtcSetSceneBuildQuality(scene, highQuality_ ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
-  const auto watertight = RTC_SCENE_FLAG_ROBUST;
-  rtcSetSceneFlags(scene, coincident_ ? static_cast<RTCSceneFlags>(watertight | kQueryFilters) : watertight);
+  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);  // watertight
   return scene;
 }
 
@@ -185,6 +165,7 @@ void Accel::build(const AccelInput& input, const HitFilter* filter) {
     instanceGroup_.push_back(instance.group);
   }
   rtcCommitScene(scene_);
+  if (coincident_) buildCoincident();
   checkError("building the ray acceleration structure");
   rtcSetDeviceMemoryMonitorFunction(device_, nullptr, nullptr);
   bytes_ = static_cast<size_t>(bytes.load());
@@ -223,7 +204,8 @@ void Accel::intersect(RayBatch& rays, int count, RayHit* hits) const {
       hit.v = query.hit.v[i];
       hit.triangle = query.hit.primID[i];
       resolve(query.hit.geomID[i], query.hit.instID[0][i], hit);
-      if (coincident_) preferFacing(rays.get(first + i), hit);
+      if (coincident_)
+        preferFacing(rays.get(first + i), {query.hit.Ng_x[i], query.hit.Ng_y[i], query.hit.Ng_z[i]}, hit);
     }
   }
 }
@@ -240,10 +222,27 @@ void Accel::intersectSingle(const RayQuery& ray, RayHit& hit) const {
   hit.v = query.hit.v;
   hit.triangle = query.hit.primID;
   resolve(query.hit.geomID, query.hit.instID[0], hit);
-  if (coincident_) preferFacing(ray, hit);
+  if (coincident_) preferFacing(ray, {query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z}, hit);
 }
 
-void Accel::preferFacing(const RayQuery& ray, RayHit& hit) const {
+void Accel::buildCoincident() {
+  coincidentScene_ = newScene();
+  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+  const CoincidentFaces& faces = *coincident_;
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, faces.corners().data(), 0,
+                             sizeof(Vec3), faces.corners().size());
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, faces.triangles().data(), 0,
+                             sizeof(glm::uvec3), faces.triangles().size());
+  rtcSetGeometryUserData(geometry, this);
+  rtcSetGeometryIntersectFilterFunction(geometry, coincidentCallback);
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(coincidentScene_, geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(coincidentScene_);
+}
+
+void Accel::preferFacing(const RayQuery& ray, const Vec3& ng, RayHit& hit) const {
+  if (hit.instance == kNoInstance && !(glm::dot(ray.direction, ng) > 0)) return;
   const float reach = coincident_->reach(ray, hit);
   if (!(reach > 0)) return;
   RTCRayHit query;
@@ -251,11 +250,25 @@ void Accel::preferFacing(const RayQuery& ray, RayHit& hit) const {
   query.ray.tnear = std::max(0.0f, hit.t - reach);
   query.ray.tfar = hit.t + reach;
   query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  embreeIntersectFacing(scene_, query);
+  embreeIntersect1(coincidentScene_, query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
-  RayHit found{query.ray.tfar, query.hit.u, query.hit.v, 0, query.hit.primID};
-  resolve(query.hit.geomID, query.hit.instID[0], found);
+  const CoincidentFaces::Face& face = coincident_->faces()[query.hit.primID];
+  const RayHit found{query.ray.tfar, query.hit.u, query.hit.v, face.mesh, face.triangle, face.instance};
   if (coincident_->pairs(hit, found)) hit = found;
+}
+
+// Lets rays meet what faces them, unless they pass through it.
+void Accel::coincidentCallback(const RTCFilterFunctionNArguments* args) {
+  const auto* accel = static_cast<const Accel*>(args->geometryUserPtr);
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (args->valid[i] != -1) continue;
+    const CoincidentFaces::Face& face = accel->coincident_->faces()[RTCHitN_primID(args->hit, args->N, i)];
+    const bool passes =
+        accel->filter_ &&
+        accel->filter_->passThrough(face.mesh, face.triangle, RTCHitN_u(args->hit, args->N, i),
+                                    RTCHitN_v(args->hit, args->N, i), false, RTCRayN_id(args->ray, args->N, i));
+    if (passes || isBackFace(args, i) != face.mirrored) args->valid[i] = 0;
+  }
 }
 
 void Accel::occluded(ShadowBatch& rays, int count, bool* results) const {

@@ -144,8 +144,10 @@ class Accel {
   RTCScene newScene() const;
   void attachMesh(RTCScene scene, uint32_t mesh, const AccelInput& input);
   void intersectSingle(const RayQuery& ray, RayHit& hit) const;
-  // Replaces a hit from behind by that of a face in the same place that faces the ray.
-  void preferFacing(const RayQuery& ray, RayHit& hit) const;
+  // Replaces a hit from behind by that of a face in the same place that faces the ray. `ng` is the hit's normal in the
+  // coordinates of its mesh.
+  void preferFacing(const RayQuery& ray, const Vec3& ng, RayHit& hit) const;
+  void buildCoincident();
   void resolve(uint32_t geometry, uint32_t instance, RayHit& hit) const;
   void checkError(const char* doing) const;
 
@@ -154,6 +156,7 @@ class Accel {
   std::vector<RTCScene> groupScenes_;
   const HitFilter* filter_ = nullptr;
   const CoincidentFaces* coincident_ = nullptr;
+  RTCScene coincidentScene_ = nullptr;  // its faces alone
   size_t bytes_ = 0;
   std::string isa_;
   bool highQuality_ = true;
@@ -167,6 +170,7 @@ class Accel {
   struct FilterData;  // per Embree geometry, for the callback
   std::vector<std::unique_ptr<FilterData>> filterData_;
   static void filterCallback(const RTCFilterFunctionNArguments* args);
+  static void coincidentCallback(const RTCFilterFunctionNArguments* args);
 };
 
 }  // namespace braid

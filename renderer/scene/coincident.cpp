@@ -77,6 +77,13 @@ class KeyFilter {
   std::vector<std::atomic<uint64_t>> words_;
 };
 
+// Unit normal on the front of a triangle; 0 if it has no area.
+glm::dvec3 normalOf(const Vec3* p, bool mirrored) {
+  const glm::dvec3 n = glm::cross(glm::dvec3(p[1]) - glm::dvec3(p[0]), glm::dvec3(p[2]) - glm::dvec3(p[0]));
+  const double length = glm::length(n);
+  return length > 0 && std::isfinite(length) ? n * ((mirrored ? -1 : 1) / length) : glm::dvec3(0);
+}
+
 float largestOf(const Vec3& v) { return maxComponent(magnitudes(v)); }
 
 }  // namespace
@@ -92,17 +99,9 @@ CoincidentFaces::CoincidentFaces(const AccelInput& input, const std::vector<uint
   for (const GroupInstance& i : instances_)
     for (const uint32_t m : (*input.groups)[i.group].meshes) repeated += meshes_[m].triangles.size();
   std::vector<Placed> world;
-  for (const uint32_t m : *input.worldMeshes) world.push_back({m, Mat4(1), true});
-  if (repeated <= kMostPlaced) {
-    for (const GroupInstance& i : instances_)
-      for (const uint32_t m : (*input.groups)[i.group].meshes) world.push_back({m, i.toWorld, false});
-  } else {
-    for (const MeshGroup& group : *input.groups) {
-      std::vector<Placed> own;
-      for (const uint32_t m : group.meshes) own.push_back({m, Mat4(1), true});
-      look(own);
-    }
-  }
+  for (const uint32_t m : *input.worldMeshes) world.push_back({m, kNoInstance});
+  for (uint32_t i = 0; repeated <= kMostPlaced && i < instances_.size(); ++i)
+    for (const uint32_t m : (*input.groups)[instances_[i].group].meshes) world.push_back({m, i});
   look(world);
 }
 
@@ -113,26 +112,19 @@ void CoincidentFaces::look(const std::vector<Placed>& placed) {
     if (!opaque_[p.mesh]) continue;
     if (reachable_[p.mesh]) candidates += meshes_[p.mesh].triangles.size();
     for (const Vec3& v : meshes_[p.mesh].positions)
-      largest = std::max(largest, largestOf(p.isWorld ? v : Vec3(p.toWorld * Vec4(v, 1))));
+      largest = std::max(largest,
+                         largestOf(p.instance == kNoInstance ? v : Vec3(instances_[p.instance].toWorld * Vec4(v, 1))));
   }
   if (candidates == 0 || !(largest > 0)) return;
 
   // Calls visit(triangle, plane) for all opaque triangles with an area.
   const auto forEach = [&](const Placed& p, const auto& visit) {
-    const TriangleMesh& mesh = meshes_[p.mesh];
-    const double side = glm::determinant(Mat3(p.toWorld)) < 0 ? -1 : 1;
-    parallelChunks(mesh.triangles.size(), 4096, [&](size_t begin, size_t end) {
+    parallelChunks(meshes_[p.mesh].triangles.size(), 4096, [&](size_t begin, size_t end) {
       for (size_t t = begin; t < end; ++t) {
-        glm::dvec3 v[3];
-        for (int k = 0; k < 3; ++k) {
-          const Vec3& local = mesh.positions[mesh.triangles[t][k]];
-          v[k] = glm::dvec3(p.isWorld ? local : Vec3(p.toWorld * Vec4(local, 1)));
-        }
-        const glm::dvec3 n = side * glm::cross(v[1] - v[0], v[2] - v[0]);
-        const double length = glm::length(n);
-        if (!(length > 0) || !std::isfinite(length)) continue;
-        const glm::dvec3 unit = n / length;
-        const double distance = glm::dot(unit, v[0]) / static_cast<double>(largest);
+        const Triangle triangle = triangleOf(p.mesh, static_cast<uint32_t>(t), p.instance);
+        const glm::dvec3 unit = normalOf(triangle.p, triangle.mirrored);
+        if (!(glm::dot(unit, unit) > 0.5)) continue;
+        const double distance = glm::dot(unit, glm::dvec3(triangle.p[0])) / static_cast<double>(largest);
         visit(t, Plane{unit.x * kNormalCells, unit.y * kNormalCells, unit.z * kNormalCells, distance * kDistanceCells});
       }
     });
@@ -143,17 +135,20 @@ void CoincidentFaces::look(const std::vector<Placed>& placed) {
     if (opaque_[p.mesh] && reachable_[p.mesh])
       forEach(p, [&](size_t, const Plane& plane) { fronts.insert(keyOf(plane)); });
   std::vector<uint64_t> backs;
+  std::vector<Face> found;
   std::mutex mutex;
   for (const Placed& p : placed) {
     if (!opaque_[p.mesh]) continue;
-    forEach(p, [&](size_t, const Plane& plane) {
+    forEach(p, [&](size_t t, const Plane& plane) {
       if (!anyCell(opposite(plane), [&](uint64_t key) { return fronts.mayHold(key); })) return;
       const std::lock_guard lock(mutex);
       backs.push_back(keyOf(plane));
+      found.push_back({p.mesh, static_cast<uint32_t>(t), p.instance, false});
     });
   }
   std::sort(backs.begin(), backs.end());
   backs.erase(std::unique(backs.begin(), backs.end()), backs.end());
+  bool any = false;
   for (const Placed& p : placed) {
     if (backs.empty() || !opaque_[p.mesh] || !reachable_[p.mesh]) continue;
     std::vector<bool>& suspect = suspect_[p.mesh];
@@ -163,31 +158,32 @@ void CoincidentFaces::look(const std::vector<Placed>& placed) {
       const std::lock_guard lock(mutex);
       suspect.resize(meshes_[p.mesh].triangles.size());
       suspect[t] = true;
-      any_ = true;
+      any = true;
     });
+  }
+  if (any) faces_ = std::move(found);
+  std::sort(faces_.begin(), faces_.end());  // the order of threads must not show
+  corners_.reserve(3 * faces_.size() + 1);  // Embree loads 16 bytes a vertex
+  triangles_.reserve(faces_.size() + 1);
+  for (Face& face : faces_) {
+    const auto first = static_cast<uint32_t>(corners_.size());
+    const Triangle triangle = triangleOf(face.mesh, face.triangle, face.instance);
+    corners_.insert(corners_.end(), triangle.p, triangle.p + 3);
+    triangles_.push_back({first, first + 1, first + 2});
+    face.mirrored = triangle.mirrored;
   }
 }
 
-CoincidentFaces::Triangle CoincidentFaces::triangleOf(const RayHit& hit) const {
-  const TriangleMesh& mesh = meshes_[hit.mesh];
-  const glm::uvec3& index = mesh.triangles[hit.triangle];
+CoincidentFaces::Triangle CoincidentFaces::triangleOf(uint32_t meshIndex, uint32_t number, uint32_t instance) const {
+  const TriangleMesh& mesh = meshes_[meshIndex];
+  const glm::uvec3& index = mesh.triangles[number];
   Triangle triangle{{mesh.positions[index.x], mesh.positions[index.y], mesh.positions[index.z]}, false};
-  if (hit.instance == kNoInstance) return triangle;
-  const Mat4& toWorld = instances_[hit.instance].toWorld;
+  if (instance == kNoInstance) return triangle;
+  const Mat4& toWorld = instances_[instance].toWorld;
   for (Vec3& p : triangle.p) p = Vec3(toWorld * Vec4(p, 1));
   triangle.mirrored = glm::determinant(Mat3(toWorld)) < 0;
   return triangle;
 }
-
-namespace {
-
-glm::dvec3 normalOf(const Vec3* p, bool mirrored) {
-  const glm::dvec3 n = glm::cross(glm::dvec3(p[1]) - glm::dvec3(p[0]), glm::dvec3(p[2]) - glm::dvec3(p[0]));
-  const double length = glm::length(n);
-  return length > 0 ? n * ((mirrored ? -1 : 1) / length) : glm::dvec3(0);
-}
-
-}  // namespace
 
 float CoincidentFaces::reach(const RayQuery& ray, const RayHit& hit) const {
   const std::vector<bool>& suspect = suspect_[hit.mesh];

@@ -63,7 +63,7 @@ struct CameraData {
 };
 
 // A latitude-longitude environment: up is +Y, the centre of the image lies in direction +X and what is right of it
-// toward +Z, as in three.js and in files that Blender exports; `rotation` turns it about +Y, from +Z toward +X.
+// toward +Z, as in three.js and, with glTF's axes, in Blender; `rotation` turns it about +Y, from +Z toward +X.
 struct EnvironmentData {
   std::shared_ptr<const Image> image;  // null: the constant `radiance`
   Spectrum radiance{0};                // constant radiance, or the scale of the image
