@@ -2,6 +2,7 @@
 // Scenes that lie far from the zero of their file's coordinates, as models in map and earth-centred coordinates do.
 #include <doctest/doctest.h>
 
+#include "renderer/film/exr.h"
 #include "tests/command_line.h"
 #include "tests/gltf_fixture.h"
 #include "tests/pass_means.h"

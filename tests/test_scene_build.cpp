@@ -255,7 +255,7 @@ TEST_CASE("A mesh pressed flat by its transform is drawn, alone and among other 
     }
     const Scene scene(std::move(data));
     CAPTURE(repeated);
-    CHECK(scene.bounds().lo.z == (repeated ? -1 : 7));
+    CHECK(scene.bounds().lo.z == doctest::Approx(repeated ? -1 : 7));
     Rng rng(3);
     for (int i = 0; i < 200; ++i) {
       const Vec3 to(0.9f * randomPoint(rng).x, 1.2f * randomPoint(rng).y, 7),

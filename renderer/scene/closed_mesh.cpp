@@ -47,7 +47,7 @@ bool isClosedOutward(const TriangleMesh& mesh) {
   for (uint64_t e : edges)
     if (!std::binary_search(edges.begin(), edges.end(), e << 32 | e >> 32)) return false;
   // Thinner than its coordinates are rounded, it is two faces back to back, of which rays may meet either.
-  constexpr double kRounding = 8 * static_cast<double>(std::numeric_limits<float>::epsilon());
+  constexpr double kRounding = 2 * static_cast<double>(std::numeric_limits<float>::epsilon());
   return volume > kRounding * largest * area;
 }
 
