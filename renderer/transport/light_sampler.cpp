@@ -163,7 +163,7 @@ bool LightSampler::samplePunctual(const PunctualLight& light, const Vec3& p, Lig
   if (!(distance2 > 0)) return false;
   out.distance = std::sqrt(distance2);
   out.wi = d / out.distance;
-  out.radiance = light.intensity * (rangeWindow(light, out.distance) / distance2);
+  out.radiance = light.intensity / distance2 * rangeWindow(light, out.distance);
   if (light.kind == PunctualKind::Spot) out.radiance *= spotFalloff(light, -glm::dot(out.wi, light.direction));
   out.pdfW = 1;
   out.delta = true;
