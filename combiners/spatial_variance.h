@@ -11,9 +11,10 @@ namespace braid {
 // independent: a box filter, or one that shares no samples between pixels.
 //
 // Second differences x0 - (x1 + x2) / 2 in four directions vanish on slopes; along an edge one of the directions sees
-// noise alone, so the least of them counts. Averaged over 9 x 9 pixels by their square roots, so that single fireflies
-// do not count as the noise of what surrounds them; a pixel that stands out keeps its own difference. Albedos are
-// divided out, and differences across edges of features are left out. Finite, >= 0, in the units of image².
+// noise alone, so the least of them counts. They are taken relative to the brightness, in proportion to which the noise
+// of path tracing grows, so that lamps do not count as the noise of what they shine on, and averaged over 9 x 9 pixels
+// by their square roots, so that single fireflies do not either; a pixel that stands out keeps its own difference.
+// Albedos are divided out, and differences across edges of features are left out. Finite, >= 0, in the units of image².
 Rgb<float> spatialVariance(const Rgb<float>& image, const Features* features);
 
 // Two halves of an estimate with a mean and a variance: mean ± the same normal noise of that variance. They have the

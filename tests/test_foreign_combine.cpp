@@ -124,6 +124,24 @@ TEST_CASE("Spatial variance: normal noise is met to 10 %, slopes have none, a fi
   CHECK(meanOfPlanes(spatialVariance(Rgb<float>(2, 40, 3.0f), nullptr)) == 0);
 }
 
+TEST_CASE("Spatial variance: small lamps neither count as noise nor lend theirs to what is around") {
+  // Noise of a third of the light, and lamps of 2 x 2 and 5 x 5 pixels, ten thousand times as bright.
+  Estimate e;
+  e.mean = Rgb<float>(80, 60, 0.1f);
+  e.variance = Rgb<float>(80, 60, 0.001f);
+  makeHalves(e, 3);
+  Rgb<float> image = e.half[0];
+  for (size_t k = 0; k < 3; ++k)
+    for (const auto& [size, at] : {std::pair(2, 20), {5, 50}})
+      for (int y = 30; y < 30 + size; ++y)
+        for (int x = at; x < at + size; ++x) image[k].at(x, y) = 1000;
+  const Rgb<float> v = spatialVariance(image, nullptr);
+  for (const auto& [x, y] : {std::pair(19, 30), {22, 33}, {24, 31}, {49, 32}, {55, 35}, {58, 30}})
+    CHECK_MESSAGE(v[1].at(x, y) < 0.01f, x, " ", y);
+  for (const auto& [x, y] : {std::pair(20, 30), {21, 31}, {50, 30}, {52, 32}, {54, 34}})
+    CHECK_MESSAGE(v[1].at(x, y) < 1e4f, x, " ", y);
+}
+
 TEST_CASE("Halves from one image: their mean is the image, their errors are independent and of twice its variance") {
   Case c = noisyCase(256, 192, 0.25);
   Estimate e = c.pt();
