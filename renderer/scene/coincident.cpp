@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <mutex>
+#include <optional>
 
 #include "renderer/core/hash.h"
 #include "renderer/core/parallel.h"
@@ -17,20 +18,24 @@ namespace {
 
 // A plane as unit normal and distance from zero, in units of cells that are far wider than rounding errors of planes of
 // one triangle, or of large ones.
-using Plane = std::array<double, 4>;
+using Plane = std::array<float, 4>;
 constexpr double kNormalCells = 1024, kDistanceCells = 65536;
 // A value so near to the next cell might have been rounded into it.
-constexpr double kNextCell = 0.5 - 1.0 / 32;
+constexpr float kNextCell = 0.5f - 1.0f / 32;
 
-uint64_t keyOf(const std::array<int64_t, 4>& cell) {
+using Cell = std::array<int64_t, 4>;
+
+int64_t nearest(float x) { return static_cast<int64_t>(x < 0 ? x - 0.5f : x + 0.5f); }
+
+uint64_t keyOf(const Cell& cell) {
   uint64_t key = 0;
-  for (const int64_t c : cell) key = hashCombine(key, static_cast<uint64_t>(c));
-  return key;
+  for (const int64_t c : cell) key = (key ^ static_cast<uint64_t>(c)) * 0x9e3779b97f4a7c15ull;
+  return mix64(key);
 }
 
 uint64_t keyOf(const Plane& plane) {
-  std::array<int64_t, 4> cell;
-  for (size_t i = 0; i < 4; ++i) cell[i] = std::llround(plane[i]);
+  Cell cell;
+  for (size_t i = 0; i < 4; ++i) cell[i] = nearest(plane[i]);
   return keyOf(cell);
 }
 
@@ -39,23 +44,23 @@ Plane opposite(const Plane& p) { return {-p[0], -p[1], -p[2], -p[3]}; }
 // Calls found(key) for the cell of a plane and for those that it might have been rounded into; whether any call did.
 template <class Found>
 bool anyCell(const Plane& plane, const Found& found) {
-  std::array<int64_t, 4> nearest, other;
+  Cell cell;
+  std::array<int64_t, 4> step{};
+  unsigned unsure = 0;
   for (size_t i = 0; i < 4; ++i) {
-    nearest[i] = std::llround(plane[i]);
-    const double off = plane[i] - static_cast<double>(nearest[i]);
-    other[i] = nearest[i] + (off > kNextCell ? 1 : off < -kNextCell ? -1 : 0);
+    cell[i] = nearest(plane[i]);
+    const float off = plane[i] - static_cast<float>(cell[i]);
+    if (std::abs(off) <= kNextCell) continue;
+    step[i] = off > 0 ? 1 : -1;
+    unsure |= 1u << i;
   }
-  for (unsigned choice = 0; choice < 16; ++choice) {
-    std::array<int64_t, 4> cell = nearest;
-    bool isNew = true;
-    for (size_t i = 0; i < 4; ++i) {
-      if (!(choice >> i & 1)) continue;
-      isNew = isNew && other[i] != nearest[i];
-      cell[i] = other[i];
-    }
-    if (isNew && found(keyOf(cell))) return true;
+  for (unsigned choice = unsure;; choice = (choice - 1) & unsure) {
+    Cell other = cell;
+    for (size_t i = 0; i < 4; ++i)
+      if (choice >> i & 1) other[i] += step[i];
+    if (found(keyOf(other))) return true;
+    if (choice == 0) return false;
   }
-  return false;
 }
 
 // A set of keys that may claim to hold others, one in a hundred.
@@ -77,11 +82,39 @@ class KeyFilter {
   std::vector<std::atomic<uint64_t>> words_;
 };
 
+// A set of keys that is filled first and asked afterwards.
+class KeySet {
+ public:
+  void add(uint64_t key) { keys_.push_back(key); }
+  void finish() {
+    std::sort(keys_.begin(), keys_.end());
+    keys_.erase(std::unique(keys_.begin(), keys_.end()), keys_.end());
+    filter_.emplace(keys_.size());
+    for (const uint64_t key : keys_) filter_->insert(key);
+  }
+  bool holds(uint64_t key) const {
+    return filter_->mayHold(key) && std::binary_search(keys_.begin(), keys_.end(), key);
+  }
+
+ private:
+  std::vector<uint64_t> keys_;
+  std::optional<KeyFilter> filter_;
+};
+
 // Unit normal on the front of a triangle; 0 if it has no area.
 glm::dvec3 normalOf(const Vec3* p, bool mirrored) {
   const glm::dvec3 n = glm::cross(glm::dvec3(p[1]) - glm::dvec3(p[0]), glm::dvec3(p[2]) - glm::dvec3(p[0]));
   const double length = glm::length(n);
   return length > 0 && std::isfinite(length) ? n * ((mirrored ? -1 : 1) / length) : glm::dvec3(0);
+}
+
+Plane planeOf(const Vec3* p, bool mirrored, float largest) {
+  const glm::dvec3 unit = normalOf(p, mirrored);
+  if (!(glm::dot(unit, unit) > 0.5)) return {std::numeric_limits<float>::quiet_NaN()};
+  const double distance = glm::dot(unit, glm::dvec3(p[0])) / static_cast<double>(largest);
+  const glm::dvec3 normal = kNormalCells * unit;
+  return {static_cast<float>(normal.x), static_cast<float>(normal.y), static_cast<float>(normal.z),
+          static_cast<float>(kDistanceCells * distance)};
 }
 
 float largestOf(const Vec3& v) { return maxComponent(magnitudes(v)); }
@@ -117,51 +150,60 @@ void CoincidentFaces::look(const std::vector<Placed>& placed) {
   }
   if (candidates == 0 || !(largest > 0)) return;
 
-  // Calls visit(triangle, plane) for all opaque triangles with an area.
-  const auto forEach = [&](const Placed& p, const auto& visit) {
-    parallelChunks(meshes_[p.mesh].triangles.size(), 4096, [&](size_t begin, size_t end) {
+  // Of all opaque triangles; not a number where one has no area.
+  std::vector<std::vector<Plane>> planes(placed.size());
+  for (size_t i = 0; i < placed.size(); ++i) {
+    if (!opaque_[placed[i].mesh]) continue;
+    planes[i].resize(meshes_[placed[i].mesh].triangles.size());
+    parallelChunks(planes[i].size(), 4096, [&](size_t begin, size_t end) {
       for (size_t t = begin; t < end; ++t) {
-        const Triangle triangle = triangleOf(p.mesh, static_cast<uint32_t>(t), p.instance);
-        const glm::dvec3 unit = normalOf(triangle.p, triangle.mirrored);
-        if (!(glm::dot(unit, unit) > 0.5)) continue;
-        const double distance = glm::dot(unit, glm::dvec3(triangle.p[0])) / static_cast<double>(largest);
-        visit(t, Plane{unit.x * kNormalCells, unit.y * kNormalCells, unit.z * kNormalCells, distance * kDistanceCells});
+        const Triangle triangle = triangleOf(placed[i].mesh, static_cast<uint32_t>(t), placed[i].instance);
+        planes[i][t] = planeOf(triangle.p, triangle.mirrored, largest);
       }
+    });
+  }
+  const auto forEach = [&](size_t i, const auto& visit) {
+    parallelChunks(planes[i].size(), 4096, [&](size_t begin, size_t end) {
+      for (size_t t = begin; t < end; ++t)
+        if (!std::isnan(planes[i][t][0])) visit(t, planes[i][t]);
     });
   };
 
-  KeyFilter fronts(candidates);
-  for (const Placed& p : placed)
-    if (opaque_[p.mesh] && reachable_[p.mesh])
-      forEach(p, [&](size_t, const Plane& plane) { fronts.insert(keyOf(plane)); });
-  std::vector<uint64_t> backs;
-  std::vector<Face> found;
+  // By a filter first: of most triangles there is no other in the plane.
+  KeyFilter reachable(candidates);
+  for (size_t i = 0; i < placed.size(); ++i)
+    if (reachable_[placed[i].mesh]) forEach(i, [&](size_t, const Plane& plane) { reachable.insert(keyOf(plane)); });
   std::mutex mutex;
-  for (const Placed& p : placed) {
-    if (!opaque_[p.mesh]) continue;
-    forEach(p, [&](size_t t, const Plane& plane) {
-      if (!anyCell(opposite(plane), [&](uint64_t key) { return fronts.mayHold(key); })) return;
+  std::vector<std::pair<Face, Plane>> fronts;  // may be found behind one that is reachable
+  for (size_t i = 0; i < placed.size(); ++i) {
+    forEach(i, [&](size_t t, const Plane& plane) {
+      if (!anyCell(opposite(plane), [&](uint64_t key) { return reachable.mayHold(key); })) return;
       const std::lock_guard lock(mutex);
-      backs.push_back(keyOf(plane));
-      found.push_back({p.mesh, static_cast<uint32_t>(t), p.instance, false});
+      fronts.emplace_back(Face{placed[i].mesh, static_cast<uint32_t>(t), placed[i].instance, false}, plane);
     });
   }
-  std::sort(backs.begin(), backs.end());
-  backs.erase(std::unique(backs.begin(), backs.end()), backs.end());
-  bool any = false;
-  for (const Placed& p : placed) {
-    if (backs.empty() || !opaque_[p.mesh] || !reachable_[p.mesh]) continue;
-    std::vector<bool>& suspect = suspect_[p.mesh];
-    forEach(p, [&](size_t t, const Plane& plane) {
-      const auto isBack = [&](uint64_t key) { return std::binary_search(backs.begin(), backs.end(), key); };
-      if (!anyCell(opposite(plane), isBack)) return;
+  KeySet frontKeys;
+  for (const auto& [face, plane] : fronts) frontKeys.add(keyOf(plane));
+  frontKeys.finish();
+  KeySet backKeys;
+  for (size_t i = 0; i < placed.size(); ++i) {
+    if (fronts.empty() || !reachable_[placed[i].mesh]) continue;
+    std::vector<bool>& suspect = suspect_[placed[i].mesh];
+    forEach(i, [&](size_t t, const Plane& plane) {
+      if (!anyCell(opposite(plane), [&](uint64_t key) { return frontKeys.holds(key); })) return;
       const std::lock_guard lock(mutex);
-      suspect.resize(meshes_[p.mesh].triangles.size());
+      suspect.resize(planes[i].size());
       suspect[t] = true;
-      any = true;
+      backKeys.add(keyOf(plane));
     });
   }
-  if (any) faces_ = std::move(found);
+  backKeys.finish();
+  for (const auto& [face, plane] : fronts)
+    if (anyCell(opposite(plane), [&](uint64_t key) { return backKeys.holds(key); })) faces_.push_back(face);
+  listFaces();
+}
+
+void CoincidentFaces::listFaces() {
   std::sort(faces_.begin(), faces_.end());  // the order of threads must not show
   corners_.reserve(3 * faces_.size() + 1);  // Embree loads 16 bytes a vertex
   triangles_.reserve(faces_.size() + 1);

@@ -12,11 +12,11 @@ namespace braid {
 
 class CoincidentFaces {
  public:
-  // Looks for opaque triangles of which another one, facing the other way, lies in the same plane. `reachable`, per
-  // mesh: whether rays may meet its back faces; `opaque`: whether no light passes its surface. Repeated meshes are
-  // compared up to kMostPlaced triangles in all; beyond that they are left out.
+  // Looks for opaque triangles of which another one, facing the other way, lies in the same plane, in linear time.
+  // `reachable`, per mesh: whether rays may meet its back faces; `opaque`: whether no light passes its surface.
+  // Repeated meshes are compared up to kMostPlaced triangles in all; beyond that they are left out.
   CoincidentFaces(const AccelInput& input, const std::vector<uint8_t>& reachable, const std::vector<uint8_t>& opaque);
-  static constexpr uint64_t kMostPlaced = uint64_t(1) << 24;
+  static constexpr uint64_t kMostPlaced = uint64_t(1) << 18;
 
   // Scenes without such faces pay for nothing.
   bool any() const { return !faces_.empty(); }
@@ -49,6 +49,7 @@ class CoincidentFaces {
   Triangle triangleOf(uint32_t mesh, uint32_t triangle, uint32_t instance) const;
   Triangle triangleOf(const RayHit& hit) const { return triangleOf(hit.mesh, hit.triangle, hit.instance); }
   void look(const std::vector<Placed>& placed);
+  void listFaces();
 
   const std::vector<TriangleMesh>& meshes_;
   const std::vector<GroupInstance>& instances_;
