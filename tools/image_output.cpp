@@ -2,6 +2,7 @@
 #include "tools/image_output.h"
 
 #include <cmath>
+#include <exception>
 #include <utility>
 
 #include <CLI/CLI.hpp>
@@ -12,6 +13,7 @@
 #include "renderer/film/error_map.h"
 #include "tools/output_options.h"
 #include "tools/progress_line.h"
+#include "tools/told_error.h"
 
 namespace braid {
 
@@ -31,11 +33,26 @@ std::optional<double> headlineError(const PipelineResult& combined, const std::v
                                     const Estimates& estimates) {
   if (const MethodResult* result = headlineOf(combined, wanted)) {
     if (result->error.empty()) return std::nullopt;
-    return relativeError(result->error, result->image.mean);
+    return relativeError(result->error, squaredLevels(result->image.mean));
   }
   const Estimate& first = estimates.estimates.front();
   if (!knowsError(first)) return std::nullopt;
-  return relativeError(errorMap(first), first.mean);
+  return relativeError(errorMap(first), squaredLevels(first));
+}
+
+// Both tasks run, beside each other; then throws what the first of them threw.
+void bothWhateverFails(const std::function<void()>& one, const std::function<void()>& other) {
+  std::exception_ptr failures[2];
+  const auto caught = [](const std::function<void()>& task, std::exception_ptr& failure) {
+    try {
+      task();
+    } catch (...) {
+      failure = std::current_exception();
+    }
+  };
+  parallelBoth([&] { caught(one, failures[0]); }, [&] { caught(other, failures[1]); });
+  for (const std::exception_ptr& failure : failures)
+    if (failure) std::rethrow_exception(failure);
 }
 
 }  // namespace
@@ -66,43 +83,24 @@ void addImageOptions(CLI::App& command, ImageOutput& o) {
   command.add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
 }
 
-double relativeError(const Plane<float>& error, const Rgb<float>& image) {
-  struct Sum {
-    double total = 0;
-    uint64_t count = 0;
-    Sum& operator+=(const Sum& other) {
-      total += other.total;
-      count += other.count;
-      return *this;
-    }
-  };
-  const Sum sum = parallelSum(error.size(), kPixelChunk, Sum{}, [&](size_t begin, size_t end) {
-    Sum s;
-    for (size_t i = begin; i < end; ++i) {
-      const double mean =
-          (static_cast<double>(image[0][i]) + static_cast<double>(image[1][i]) + static_cast<double>(image[2][i])) / 3;
-      const double value = static_cast<double>(error[i]) / (mean * mean + 0.01);
-      if (!std::isfinite(value)) continue;
-      s.total += value;
-      ++s.count;
-    }
-    return s;
-  });
-  return sum.count > 0 ? sum.total / static_cast<double>(sum.count) : 0.0;
-}
-
 void showImages(const Estimates& estimates, const PipelineResult& combined, const std::vector<std::string>& wanted,
                 const ShowImages& show) {
   const Estimate& first = estimates.estimates.front();
   ImageViews views{&first.mean};
-  Plane<float> noisyError;
+  Plane<float> noisyError, noisyLevels, combinedLevels;
   if (knowsError(first)) {
     noisyError = errorMap(first);
+    noisyLevels = squaredLevels(first);
     views.noisyError = &noisyError;
+    views.noisyLevels = &noisyLevels;
   }
   if (const MethodResult* result = headlineOf(combined, wanted)) {
     views.combined = &result->image.mean;
-    if (!result->error.empty()) views.combinedError = &result->error;
+    if (!result->error.empty()) {
+      combinedLevels = squaredLevels(result->image.mean);
+      views.combinedError = &result->error;
+      views.combinedLevels = &combinedLevels;
+    }
   }
   show(views);
 }
@@ -122,6 +120,8 @@ WrittenImage writeImage(const ImageOutput& o, Estimates& estimates, const Plane<
     if (o.show) showImages(estimates, combined, wanted, o.show);
     const Stopwatch writing;
     written.error = headlineError(combined, wanted, estimates);
+    if (written.error)
+      estimates.attributes.push_back({"braid/estimatedError", Attribute::Kind::Float, "", 0, *written.error, {}});
     // CombinedLayers may move the estimates.
     const Rgb<float> first = headlineOf(combined, wanted) ? Rgb<float>() : estimates.estimates.front().mean;
     const CombinedLayers layers(combined, wanted, o.combine.weights, !o.noTiming, estimates);
@@ -135,14 +135,19 @@ WrittenImage writeImage(const ImageOutput& o, Estimates& estimates, const Plane<
     exr.floatHeadline = o.floatHeadline;
     exr.layerPrefix = o.layerPrefix;
     written.warnings = combineWarnings(combined);
-    if (!o.exr.empty()) {
-      const WriteReport report = writeExr(o.exr, estimates, headline, alpha, exr);
-      if (report.clampedToHalf > 0)
-        written.warnings.push_back(
-            fmt::format("{}: {} headline values above 65504 were clamped to fit half floats: use --float", o.exr,
-                        report.clampedToHalf));
-    }
-    if (!o.png.empty()) writePng(o.png, headline, static_cast<float>(o.exposure));
+    // Beside each other: a PNG is compressed by one thread.
+    WriteReport report;
+    bothWhateverFails(
+        [&] {
+          if (!o.exr.empty()) report = writeExr(o.exr, estimates, headline, alpha, exr);
+        },
+        [&] {
+          if (!o.png.empty()) writePng(o.png, headline, static_cast<float>(o.exposure));
+        });
+    if (report.clampedToHalf > 0)
+      written.warnings.push_back(
+          fmt::format("{}: {} headline values above 65504 were clamped to fit half floats: use --float", o.exr,
+                      report.clampedToHalf));
     written.writeSeconds = writing.seconds();
   });
   for (const PipelineOutput& out : combined.outputs)

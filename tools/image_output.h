@@ -24,6 +24,8 @@ struct ImageViews {
   const Rgb<float>* noisy = nullptr;     // of the first integrator
   const Rgb<float>* combined = nullptr;  // the image of the last wanted method that ran
   const Plane<float>*noisyError = nullptr, *combinedError = nullptr;
+  // squaredLevels() of what has an error; null: those of its own values.
+  const Plane<float>*noisyLevels = nullptr, *combinedLevels = nullptr;
 };
 using ShowImages = std::function<void(const ImageViews&)>;
 
@@ -44,10 +46,10 @@ void addImageOptions(CLI::App& command, ImageOutput& output);
 
 // What became of one writing.
 struct WrittenImage {
-  // Estimated squared error of the headline over its squared value + 0.01, averaged over the image (relL2 of
-  // `braid compare`); none where the headline's method does not estimate its error.
+  // relativeError() of the headline; none where the headline's method does not estimate its error.
   std::optional<double> error;
   double combineSeconds = 0, writeSeconds = 0;
+  double secondsOfRun = 0;                     // that the pass loop was held up for it
   std::vector<std::string> warnings, timings;  // one line each
   bool cancelled = false;                      // nothing was written
 };
@@ -61,8 +63,5 @@ WrittenImage writeImage(const ImageOutput& output, Estimates& estimates, const P
 // Calls `show` with what the estimates and the methods that ran on them hold.
 void showImages(const Estimates& estimates, const PipelineResult& combined, const std::vector<std::string>& wanted,
                 const ShowImages& show);
-
-// Mean of `error` / (mean over channels of `image`² + 0.01); pixels that are not finite are left out.
-double relativeError(const Plane<float>& error, const Rgb<float>& image);
 
 }  // namespace braid

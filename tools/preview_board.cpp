@@ -8,6 +8,8 @@
 #include <OpenImageIO/half.h>
 #include <unistd.h>
 
+#include "tools/told_error.h"
+
 namespace braid {
 
 namespace {
@@ -75,13 +77,11 @@ std::shared_ptr<PreviewImage> encode(const Rgb<float>& image) {
   return p;
 }
 
-// sqrt(error / (mean² + 0.01)): what relativeError() averages the square of.
-std::shared_ptr<PreviewImage> encodeError(const Plane<float>& error, const Rgb<float>& image) {
+// sqrt(error / (level² + 0.01)): what relativeError() averages the square of.
+std::shared_ptr<PreviewImage> encodeError(const Plane<float>& error, const Plane<float>& squaredLevels) {
   auto p = emptyImage(error.width, error.height, 1);
-  for (size_t i = 0; i < error.size(); ++i) {
-    const float mean = (image[0][i] + image[1][i] + image[2][i]) / 3;
-    append(p->pixels, halfBitsOrNan(std::sqrt(std::max(0.0f, error[i]) / (mean * mean + 0.01f))));
-  }
+  for (size_t i = 0; i < error.size(); ++i)
+    append(p->pixels, halfBitsOrNan(std::sqrt(std::max(0.0f, error[i]) / squaredLevels[i])));
   return p;
 }
 
@@ -155,16 +155,19 @@ void PreviewBoard::addPoint(const std::string& view, const ErrorPoint& point) {
 }
 
 void PreviewBoard::show(uint64_t spp, double seconds, const ImageViews& views) {
-  const auto showOne = [&](const std::string& view, const Rgb<float>* image, const Plane<float>* error) {
+  const auto showOne = [&](const std::string& view, const Rgb<float>* image, const Plane<float>* error,
+                           const Plane<float>* known) {
     if (!image) return;
+    const Plane<float> own = error && !known ? squaredLevels(*image) : Plane<float>();
+    const Plane<float>* levels = known ? known : &own;
     std::shared_ptr<PreviewImage> pixels = encode(*image);
-    std::shared_ptr<PreviewImage> errorPixels = error ? encodeError(*error, *image) : nullptr;
+    std::shared_ptr<PreviewImage> errorPixels = error ? encodeError(*error, *levels) : nullptr;
     for (PreviewImage* p : {pixels.get(), errorPixels.get()})
       if (p) {
         p->spp = spp;
         p->seconds = seconds;
       }
-    const double estimated = error ? relativeError(*error, *image) : 0;
+    const double estimated = error ? relativeError(*error, *levels) : 0;
     const std::lock_guard lock(mutex_);
     if (const auto old = find(view); old && old->spp > spp) return;
     changed();
@@ -173,8 +176,8 @@ void PreviewBoard::show(uint64_t spp, double seconds, const ImageViews& views) {
     put(view + "-error", std::move(errorPixels));
     addPoint(view, {seconds, spp, estimated});
   };
-  showOne("noisy", views.noisy, views.noisyError);
-  showOne("combined", views.combined, views.combinedError);
+  showOne("noisy", views.noisy, views.noisyError, views.noisyLevels);
+  showOne("combined", views.combined, views.combinedError, views.combinedLevels);
 }
 
 void PreviewBoard::warn(const std::string& text) {

@@ -7,7 +7,7 @@
 
 #include "combiners/pipeline.h"
 #include "renderer/core/error.h"
-#include "tools/image_output.h"
+#include "tools/told_error.h"
 
 namespace braid {
 
@@ -55,7 +55,7 @@ class SharedPipeline {
       return made;
     }
     made.image = output->result.image.mean;
-    if (!output->result.error.empty()) made.error = relativeError(output->result.error, made.image);
+    if (!output->result.error.empty()) made.error = relativeError(output->result.error, squaredLevels(made.image));
     const bool denoiser = output->step.method->kind() == MethodKind::Denoiser;
     made.denoiseSeconds = output->inputSeconds + (denoiser ? output->seconds : 0);
     made.combineSeconds = denoiser ? 0 : output->seconds;

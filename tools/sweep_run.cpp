@@ -9,7 +9,7 @@
 #include "renderer/core/error.h"
 #include "renderer/core/stopwatch.h"
 #include "renderer/film/error_map.h"
-#include "tools/image_output.h"
+#include "tools/told_error.h"
 
 namespace braid {
 
@@ -51,7 +51,7 @@ void evaluate(const SweepScene& scene, const SweepJob& job, const SweepJob::Cell
     made = method.finish(estimates, scene.reference.image.mean);
   } else {
     made.image = first.mean;
-    if (first.passes > 1) made.error = relativeError(errorMap(first), first.mean);
+    if (first.passes > 1) made.error = relativeError(errorMap(first), squaredLevels(first));
   }
   row.denoise = made.denoiseSeconds;
   row.combine = made.combineSeconds;
