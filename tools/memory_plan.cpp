@@ -12,6 +12,7 @@
 #include "combiners/pipeline_memory.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
+#include "renderer/film/exr_rows.h"
 #include "renderer/session/integrator.h"
 #include "tools/combining.h"
 
@@ -35,8 +36,8 @@ std::string mebibytes(uint64_t bytes) {
 
 // OpenEXR holds a few copies of the rows that it compresses.
 uint64_t writingBytes(const Plan& plan, const Facts& facts) {
-  constexpr uint64_t kRows = 128, kCopies = 3, kHeadline = 12;
-  return kRows * kCopies * static_cast<uint64_t>(plan.window.width()) *
+  constexpr uint64_t kCopies = 3, kHeadline = 12;
+  return static_cast<uint64_t>(exrRowsPerWrite()) * kCopies * static_cast<uint64_t>(plan.window.width()) *
          (static_cast<uint64_t>(estimatesMemory(facts)) + kHeadline);
 }
 

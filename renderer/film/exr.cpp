@@ -16,6 +16,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
+#include "renderer/film/exr_rows.h"
 #include "renderer/film/output_file.h"
 
 namespace braid {
@@ -23,8 +24,6 @@ namespace braid {
 namespace {
 
 constexpr float kHalfMax = 65504;
-// Rows written at once: several ZIP blocks of 16 rows, so that OpenEXR compresses them in parallel.
-constexpr int kRowsPerWrite = 128;
 
 using Names = std::array<const char*, 3>;
 constexpr Names kColour = {"R", "G", "B"};
@@ -241,9 +240,10 @@ WriteReport writeExr(const std::string& path, const Estimates& estimates, const 
     if (!out) file.fail(OIIO::geterror());
     if (!out->set_ioproxy(&file)) file.fail("this OpenImageIO cannot write EXR through a stream");
     if (!out->open(file.temporaryPath(), spec)) file.fail(out->geterror());
-    std::vector<std::byte> rows(static_cast<size_t>(kRowsPerWrite) * spec.scanline_bytes(true));
-    for (int y = 0; y < spec.height; y += kRowsPerWrite) {
-      const int end = std::min(spec.height, y + kRowsPerWrite);
+    const int rowsAtOnce = std::min(spec.height, exrRowsPerWrite());
+    std::vector<std::byte> rows(static_cast<size_t>(rowsAtOnce) * spec.scanline_bytes(true));
+    for (int y = 0; y < spec.height; y += rowsAtOnce) {
+      const int end = std::min(spec.height, y + rowsAtOnce);
       report.clampedToHalf += interleave(channels, y, end, rows);
       if (!out->write_scanlines(spec.y + y, spec.y + end, 0, OIIO::TypeDesc::UNKNOWN, rows.data()))
         file.fail(out->geterror());

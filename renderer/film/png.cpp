@@ -31,6 +31,7 @@ void writePng(const std::string& path, const Rgb<float>& image, float exposureSt
 
   OIIO::ImageSpec spec(image.width(), image.height(), 3, OIIO::TypeDesc::UINT8);
   spec.attribute("oiio:ColorSpace", "sRGB");
+  spec.attribute("png:compressionLevel", 4);  // half the time of the usual 6, for a hundredth more bytes
   OutputFile file(path, ".png");
   {
     const auto out = OIIO::ImageOutput::create("png");
