@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Publication while a render goes on: when it happens, that it changes no pixel, and what ends a run.
+#include <cmath>
+#include <cstdio>
+
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
 #include "tests/running_braid.h"
-#include "tools/image_output.h"
+#include "renderer/core/stopwatch.h"
+#include "renderer/film/exr.h"
+#include "tools/progress_line.h"
 #include "tools/publication_schedule.h"
 
 namespace braid::test_publish {
@@ -130,29 +135,26 @@ TEST_CASE("The first image is plain, combined ones follow, and one that takes to
   CHECK(u.due(at(3, 10)).combined);
 }
 
-TEST_CASE("A target of the error is looked at where it should be met, not before 16 samples") {
-  PublicationSchedule s(0, 0.01, false, {});
-  s.begun({.state = true, .image = true}, at(8, 1));
-  s.published(8, false, 0, 0.0);
-  CHECK(!s.reached());
-  s.begun({.state = true, .image = true}, at(32, 4));
-  s.published(32, false, 0, 0.015);
-  CHECK(!s.reached());
-  CHECK(!s.due(at(48, 6)).image);
-  CHECK(s.due(at(49, 6)).image);  // 32 * 1.5 * 1.02
-  s.begun({.state = true, .image = true}, at(49, 6));
-  s.published(49, false, 0, 0.0099);
-  CHECK(s.reached());
-}
-
-TEST_CASE("The relative error is the mean of squared errors over squared values, whatever is broken left out") {
-  Plane<float> error(2, 2, 0.02f);
-  Rgb<float> image(2, 2, 0.1f);
-  CHECK(relativeError(error, image) == doctest::Approx(1.0));
-  error[3] = std::numeric_limits<float>::quiet_NaN();
-  image[0][2] = image[1][2] = image[2][2] = 0;
-  CHECK(relativeError(error, image) == doctest::Approx((1 + 1 + 2) / 3.0));
-  CHECK(relativeError({}, {}) == 0);
+TEST_CASE("With a target the error is looked at after 16, 32, 64, ... rounds, whatever that costs") {
+  for (const bool combines : {false, true}) {
+    PublicationSchedule s(0, 0.01, combines, {1000, 1000});
+    std::vector<uint64_t> looks;
+    for (uint64_t round = 1; round <= 100; ++round)
+      if (s.looksAt(at(round, 1e-3 * static_cast<double>(round)))) looks.push_back(round);
+    CHECK(looks == std::vector<uint64_t>{16, 32, 64});
+    Progress last = at(64, 50, 0);
+    last.rounds = 64;
+    CHECK(!s.looksAt(last));  // the last image tells
+    CHECK(!PublicationSchedule(0, 0, combines, {}).looksAt(at(64, 1)));
+    // Combining for nothing is saved: an error that falls with the square of the samples is 0.01 after 20 rounds, or
+    // after 41.
+    s.published(10, combines, 0, 0.04);
+    CHECK(s.looksAt(at(16, 1)) == !combines);
+    CHECK(s.looksAt(at(32, 2)));
+    s.published(10, combines, 0, 0.1601);
+    CHECK(s.looksAt(at(32, 2)) == !combines);
+    CHECK(s.looksAt(at(64, 4)));
+  }
 }
 
 TEST_CASE("Publishing changes no pixel, with and without combiners") {
@@ -178,6 +180,100 @@ TEST_CASE("Publishing changes no pixel, with and without combiners") {
   }
 }
 
+TEST_CASE("A target of the error ends a run after the fewest of 16, 32, 64, ... samples that meet it, on any machine") {
+  const Folder folder;
+  const std::string common = "render '" + kCornellFile + "' --size 64x36 -o o.exr --log-json log --integrator pt ";
+  for (const std::string& combine : {std::string("none"), std::string("js --biased box")}) {
+    INFO(combine);
+    const std::string with = common + "--combine " + combine;
+    const auto end = [&] { return records(folder.path / "log").back(); };
+    const auto told = [&](int spp) {
+      CHECK(braidRun(folder, fmt::format("{} --spp {}", with, spp)).code == 0);
+      return end()["estimatedError"].get<double>();
+    };
+    const double errors[] = {told(16), told(32), told(64)};
+    REQUIRE(errors[0] > errors[1]);
+    REQUIRE(errors[1] > errors[2]);
+    for (const int threads : {1, 2}) {
+      for (int k = 0; k < 3; ++k) {
+        const std::string target = fmt::format(" --threads {} --error {}", threads, 1.0001 * errors[k]);
+        CHECK(braidRun(folder, with + target).code == 0);
+        CHECK(end()["spp"] == 16 << k);
+        CHECK(end()["reason"] == "error");
+        CHECK(end()["estimatedError"].get<double>() == errors[k]);
+        double inHeader = 0;
+        for (const Attribute& attribute : readImage(folder.path / "o.exr").attributes)
+          if (attribute.name == "braid/estimatedError") inHeader = attribute.number;
+        CHECK(inHeader == doctest::Approx(errors[k]));
+      }
+    }
+    // What the look that ends the run has written is the image of all its samples.
+    CHECK(braidRun(folder, with + fmt::format(" --reproducible --error {}", 1.0001 * errors[1])).code == 0);
+    const std::string stopped = readText(folder.path / "o.exr");
+    CHECK(braidRun(folder, with + " --reproducible --spp 32").code == 0);
+    CHECK((readText(folder.path / "o.exr") == stopped));
+  }
+  // Who tells no error cannot meet a target: nothing else ends the run.
+  const Run unknown = braidRun(folder, common + "--combine box --error 0.1");
+  CHECK(unknown.code == 6);
+  CHECK(contains(unknown.err, "the estimated error is not known"));
+  // The whole of the command that took 2055 samples while publishing decided.
+  CHECK(braidRun(folder, common + "--error 0.05").code == 0);
+  CHECK(records(folder.path / "log").back()["spp"] == 16);
+}
+
+TEST_CASE("The parts of a run add up to its time, which is that of the process") {
+  const Folder folder;
+  for (const std::string& stop : {std::string("--spp 8"), std::string("--error 0.1 --combine js --biased box")}) {
+    const Stopwatch clock;
+    const Run run =
+        braidRun(folder, "render '" + kCornellFile + "' --size 320x180 -o o.exr --png o.png --log-json log " + stop);
+    const double waited = clock.seconds();
+    CHECK(run.code == 0);
+    const Json seconds = records(folder.path / "log").back()["seconds"];
+    double sum = 0;
+    for (const auto& [part, value] : seconds.items())
+      if (part != "total") sum += value.get<double>();
+    const double total = seconds["total"].get<double>();
+    CHECK(std::fabs(sum - total) < 0.001);
+    CHECK(total <= waited + 0.02);  // the clock of the system has ticks of 10 ms
+    MESSAGE(total << " s told of " << waited << " s");
+    // The last line says the same.
+    const std::string last = run.err.substr(run.err.rfind('\n', run.err.size() - 2) + 1);
+    double whole = 0, parts[4] = {};
+    int samples = 0;
+    REQUIRE(std::sscanf(last.c_str(), "%d spp in %lfs (start and load %lfs, render %lfs, combine %lfs, write %lfs; ",
+                        &samples, &whole, &parts[0], &parts[1], &parts[2], &parts[3]) == 6);
+    CHECK(std::fabs(whole - total) < 0.0051);
+    CHECK(std::fabs(parts[0] + parts[1] + parts[2] + parts[3] - whole) < 0.0251);
+  }
+  CHECK(formatHundredths(1.234) == "1.23s");
+  CHECK(formatHundredths(59.996) == "1m00.00s");
+  CHECK(formatHundredths(7384.5) == "2h03m04.50s");
+}
+
+TEST_CASE("A limit of time holds for the whole process, and what it leaves no time for is said") {
+  const Folder folder;
+  // A second of combining is expected of this size on one thread, by a cost that is known beforehand.
+  const std::string common = "render '" + kCornellFile + "' --threads 1 -o o.exr --log-json log --integrator pt ";
+  const auto end = [&] { return records(folder.path / "log").back(); };
+  Run run = braidRun(folder, common + "--size 640x360 --time 0.6 --combine nfor");
+  CHECK(run.code == 0);
+  CHECK(contains(run.err, "the image is not combined"));
+  CHECK(readImage(folder.path / "o.exr").planes.count("combined.nfor.R") == 0);
+  CHECK(end()["spp"].get<int>() >= 1);
+  // One sample in every pixel is the least.
+  run = braidRun(folder, common + "--size 640x360 --time 0.02 --combine none");
+  CHECK(run.code == 0);
+  CHECK(end()["spp"] == 1);
+  CHECK(contains(run.err, "--time 0.0s: the first pass over the image is not done by then and goes on"));
+  // A round that would end too late is not begun.
+  run = braidRun(folder, common + "--size 320x180 --time 2 --combine none");
+  CHECK(end()["reason"] == "time");
+  CHECK(end()["seconds"]["total"].get<double>() < 3.5);
+  CHECK(end()["spp"].get<int>() > 1);
+}
+
 TEST_CASE("The first of samples, time and error ends the run, and the record says which") {
   const Folder folder;
   const std::string common = "render '" + kCornellFile + "' --size 32x24 -o o.exr --log-json log ";
@@ -185,7 +281,7 @@ TEST_CASE("The first of samples, time and error ends the run, and the record say
   Run run = braidRun(folder, common + "--error 0.01 --spp 100000 --time 60 --png o.png --checkpoint o.state");
   CHECK(run.code == 0);
   CHECK(end()["reason"] == "error");
-  CHECK(end()["estimatedError"].get<double>() < 0.011);
+  CHECK(end()["estimatedError"].get<double>() <= 0.01);
   CHECK(end()["spp"].get<int>() >= 16);
   CHECK(end()["outputs"] == Json::array({"o.exr", "o.png", "o.state"}));
   const std::string last = run.err.substr(run.err.rfind('\n', run.err.size() - 2) + 1);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <sys/ioctl.h>
 #include <unistd.h>
@@ -19,6 +20,14 @@ std::string formatSeconds(double s) {
   if (s < 60) return fmt::format("{:.1f}s", s);
   if (s < 3600) return fmt::format("{}m{:02}s", whole / 60, whole % 60);
   return fmt::format("{}h{:02}m", whole / 3600, whole / 60 % 60);
+}
+
+std::string formatHundredths(double s) {
+  const auto all = static_cast<long long>(std::llround(100 * std::max(0.0, s)));
+  const double rest = static_cast<double>(all % 6000) / 100;
+  if (all < 6000) return fmt::format("{:.2f}s", rest);
+  if (all < 360000) return fmt::format("{}m{:05.2f}s", all / 6000, rest);
+  return fmt::format("{}h{:02}m{:05.2f}s", all / 360000, all / 6000 % 60, rest);
 }
 
 ProgressLine::ProgressLine(bool quiet)

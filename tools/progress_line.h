@@ -14,6 +14,8 @@ namespace braid {
 
 // "1h02m", "3m20s" or "12.3s".
 std::string formatSeconds(double seconds);
+// "1h02m03.45s", "3m20.12s" or "12.34s": parts that are read add up to their sum.
+std::string formatHundredths(double seconds);
 
 class ProgressLine {
  public:

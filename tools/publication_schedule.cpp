@@ -17,7 +17,7 @@ PublicationSchedule::Due PublicationSchedule::due(const Progress& p) const {
   if (p.rounds > 0 && p.round >= p.rounds) return due;
   const bool soonOver = p.secondsLeft >= 0 && p.secondsLeft < kSoon;
   const auto since = [&](double last) { return saveEvery_ > 0 && p.seconds - last >= saveEvery_; };
-  const bool mark = !soonOver && (std::has_single_bit(p.round) || (checkSamples_ > 0 && p.round >= checkSamples_));
+  const bool mark = !soonOver && std::has_single_bit(p.round);
   const double plainRun = any_ ? p.seconds : lengthOfRun(p, kLeastRun);
   const bool plainPays = plainSpent_ + cost_.plain <= kPlainShare * plainRun;
   const bool combinedPays = combines_ && any_ && combinedSpent_ <= kShare * p.seconds &&
@@ -28,23 +28,26 @@ PublicationSchedule::Due PublicationSchedule::due(const Progress& p) const {
   return due;
 }
 
+bool PublicationSchedule::looksAt(const Progress& p) const {
+  const bool last = p.rounds > 0 && p.round >= p.rounds;
+  return targetError_ > 0 && !last && p.round >= nextLook_ && std::has_single_bit(p.round);
+}
+
 void PublicationSchedule::begun(const Due& what, const Progress& p) {
   if (what.state) lastState_ = p.seconds;
   if (!what.image) return;
   lastImage_ = p.seconds;
   any_ = true;
-  checkSamples_ = 0;
 }
 
-// The squared error of a mean falls as one over the number of samples.
 void PublicationSchedule::published(uint64_t samples, bool combined, double cost, std::optional<double> error) {
   (combined ? combinedSpent_ : plainSpent_) += cost;
   (combined ? cost_.combined : cost_.plain) = cost;
+  (combined ? combinedKnown_ : plainKnown_) = true;
   combinedOut_ = combinedOut_ || combined;
-  if (targetError_ <= 0 || !error || samples < kLeastSamples) return;
-  reached_ = reached_ || *error <= targetError_;
-  const double needed = std::ceil(static_cast<double>(samples) * std::min(2.0, 1.02 * *error / targetError_));
-  checkSamples_ = std::max(samples + 1, static_cast<uint64_t>(needed));
+  if (targetError_ <= 0 || !combined || !error || !(*error > targetError_)) return;
+  const double needed = std::min(1e15, static_cast<double>(samples) * std::sqrt(*error / targetError_));
+  nextLook_ = std::max(kLeastSamples, static_cast<uint64_t>(std::ceil(needed)));
 }
 
 bool PublicationSchedule::tooLong(const Progress& p, double cost) const {
@@ -55,6 +58,7 @@ bool PublicationSchedule::tooLong(const Progress& p, double cost) const {
 void PublicationSchedule::givenUp(double cost) {
   combinedSpent_ += cost;
   cost_.combined = 2 * cost;
+  combinedKnown_ = true;
 }
 
 }  // namespace braid

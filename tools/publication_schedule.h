@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// When a running render shows what it has: after the rounds 1, 2, 4, 8, …, every so many seconds, and where the error
-// is expected to meet its target; but never so often that showing takes more than its share of the time.
+// When a running render shows what it has: after the rounds 1, 2, 4, 8, …, and every so many seconds, but never so
+// often that showing takes more than its share of the time. With a target of the error it also looks at the finished
+// image after 16, 32, 64, … rounds, whatever that costs: a run ends with the same samples on every machine.
 //
 // With combiners the first image out is the plain one. Combined ones replace it as soon as they are affordable, the
 // last one of the run included, and one that turns out to be too long is given up.
@@ -40,11 +41,15 @@ class PublicationSchedule {
   };
   // What to do after this round.
   Due due(const Progress& progress) const;
+  // Whether the error of the image of this round has to be known, for it may end the run.
+  bool looksAt(const Progress& progress) const;
 
   // What was begun of it. Costs are in seconds of the whole machine.
   void begun(const Due& what, const Progress& progress);
   void spend(double cost) { plainSpent_ += cost; }
   // An image is out: its samples, what it cost, and its estimated error where that is known and meant by the target.
+  // Combining for nothing is saved where the target is far: the error is taken to fall with the square of the number of
+  // samples at most (a mean's falls with the number).
   void published(uint64_t samples, bool combined, double cost, std::optional<double> error);
   // Whether the combined image at work, with this cost so far, has to be given up.
   bool tooLong(const Progress& progress, double cost) const;
@@ -53,8 +58,11 @@ class PublicationSchedule {
   // What everything that is out or was given up has cost, in seconds of the whole machine.
   double spent() const { return plainSpent_ + combinedSpent_; }
 
-  // Whether a published error met the target.
-  bool reached() const { return reached_; }
+  // What an image costs: what the last one did, or else what is expected on a machine that has nothing else to do,
+  // `slowdown` times.
+  double cost(bool combined, double slowdown) const {
+    return combined ? cost_.combined * (combinedKnown_ ? 1 : slowdown) : cost_.plain * (plainKnown_ ? 1 : slowdown);
+  }
 
  private:
   static double lengthOfRun(const Progress& progress, double least);
@@ -67,8 +75,8 @@ class PublicationSchedule {
   // Apart, so that frequent saving does not keep combiners from their share.
   double plainSpent_ = 0, combinedSpent_ = 0;
   Costs cost_;
-  bool any_ = false, combinedOut_ = false, reached_ = false;
-  uint64_t checkSamples_ = 0;  // when the error is worth a look; 0: not before the next power of two
+  bool any_ = false, combinedOut_ = false, plainKnown_ = false, combinedKnown_ = false;
+  uint64_t nextLook_ = kLeastSamples;
 };
 
 }  // namespace braid

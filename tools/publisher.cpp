@@ -8,11 +8,15 @@
 #include <new>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 #include "renderer/core/stopwatch.h"
 #include "renderer/film/state_file.h"
+#include "tools/alarm.h"
 #include "tools/header.h"
+#include "tools/progress_line.h"
 
 namespace braid {
 
@@ -20,7 +24,7 @@ namespace {
 
 // What images are expected to cost before there was one, in seconds of one core a pixel: writing all layers or few, and
 // "auto" on top of it.
-constexpr double kWritingAll = 1.6e-6, kWritingFew = 2e-7, kCombining = 3e-6;
+constexpr double kWritingAll = 1.6e-6, kWritingFew = 4e-7, kCombining = 3e-6;
 
 int threadsOf(const PublishOptions& options) { return options.threads > 0 ? options.threads : machineThreads(); }
 
@@ -66,8 +70,10 @@ void BackgroundJob::wait() {
   if (thread_.joinable()) thread_.join();
 }
 
-bool BackgroundJob::collect(std::exception_ptr& failure) {
-  if (!thread_.joinable() || !done_.load()) return false;
+bool BackgroundJob::collect(std::exception_ptr& failure) { return done_.load() && collectLast(failure); }
+
+bool BackgroundJob::collectLast(std::exception_ptr& failure) {
+  if (!thread_.joinable()) return false;
   thread_.join();
   failure = failure_;
   return true;
@@ -77,11 +83,9 @@ Publisher::Publisher(PublishOptions options, Session& session)
     : options_(std::move(options)),
       combines_(!options_.image.combine.wanted().empty() || !options_.image.combine.denoisers.empty()),
       session_(session),
-      schedule_(options_.saveEvery, options_.targetError, combines_, expectedCosts(session, options_)) {
-  const int threads = threadsOf(options_);
-  helpers_ = std::max(1, threads / 4);
-  machineShare_ = static_cast<double>(helpers_) / threads;
-}
+      schedule_(options_.saveEvery, options_.targetError, combines_, expectedCosts(session, options_)),
+      helpers_(std::max(1, threadsOf(options_) / 4)),
+      combinesLast_(combines_) {}
 
 Publisher::~Publisher() {
   cancel_ = true;
@@ -99,9 +103,9 @@ void Publisher::fail(std::vector<Publication>& news, const std::exception_ptr& f
   }
 }
 
-void Publisher::collect(std::vector<Publication>& news) {
+void Publisher::collect(std::vector<Publication>& news, bool wait) {
   std::exception_ptr failure;
-  if (imageJob_.collect(failure)) {
+  if (wait ? imageJob_.collectLast(failure) : imageJob_.collect(failure)) {
     const double cost = heldUp_ + took_ * machineShare_;
     // What a cancelled method throws is no news.
     if (failure && cancel_) pending_.image.cancelled = true;
@@ -115,7 +119,6 @@ void Publisher::collect(std::vector<Publication>& news) {
       fail(news, failure, pending_);
     else if (!pending_.image.cancelled)
       news.push_back(pending_);
-    reached_ = schedule_.reached();
   }
   if (stateJob_.collect(failure) && failure) fail(news, failure, saving_);
 }
@@ -132,19 +135,20 @@ void Publisher::saveState(const Progress& p, std::vector<Publication>& news) {
   schedule_.spend(clock.seconds());
 }
 
-void Publisher::publishImage(const Progress& p, bool combined) {
+void Publisher::publishImage(const Progress& p, bool combined, int threads) {
   const Stopwatch clock;
   cancel_ = false;
+  machineShare_ = static_cast<double>(threads) / threadsOf(options_);
   pending_ = {samplesOf(session_.state()), p.seconds, combined, {}, {}};
   const auto output = std::make_shared<ImageOutput>(combined ? options_.image : withoutCombining(options_.image));
   auto shown = std::make_shared<Estimates>(describedEstimates(session_, !options_.image.noTiming));
   const auto alpha = std::make_shared<std::optional<Plane<float>>>(session_.alpha());
   heldUp_ = clock.seconds();
   jobClock_.restart();
-  imageJob_.start([this, output, shown, alpha] {
+  imageJob_.start([this, output, shown, alpha, threads] {
     const Stopwatch job;
     try {
-      pending_.image = writeImage(*output, *shown, *alpha ? &**alpha : nullptr, helpers_, &cancel_);
+      pending_.image = writeImage(*output, *shown, *alpha ? &**alpha : nullptr, threads, &cancel_);
     } catch (...) {
       took_ = job.seconds();
       throw;
@@ -152,6 +156,34 @@ void Publisher::publishImage(const Progress& p, bool combined) {
     giveBackFreedMemory();
     took_ = job.seconds();
   });
+}
+
+void Publisher::look(const Progress& p, std::vector<Publication>& news) {
+  // Where the last image would not be done in time, it tells the error.
+  if (options_.limit.left() < lastCost(combines_)) return;
+  cancel_ = true;  // what is at work makes way
+  collect(news, true);
+  const Stopwatch clock;
+  publishImage(p, combines_, threadsOf(options_));
+  schedule_.begun({.state = false, .image = true, .combined = combines_}, p);
+  collect(news, true);
+  const std::optional<double>& error = pending_.image.error;
+  const bool written = !pending_.image.cancelled && pending_.image.writeSeconds > 0;
+  // An error that is never told would never end the run.
+  if (!written || (error ? *error > options_.targetError : !options_.endless)) return;
+  reached_ = true;
+  last_ = pending_.image;
+  last_->secondsOfRun = clock.seconds();
+}
+
+double Publisher::timeLeft() const { return options_.limit.left() - (hasImage() ? lastCost(combinesLast_) : 0); }
+
+// How much longer everything takes than on a machine that has nothing else to do: passes keep all threads at work.
+double Publisher::slowdown() const {
+  constexpr double kSoon = 0.1, kMost = 4;
+  const double processor = static_cast<double>(std::clock() - processor_) / CLOCKS_PER_SEC, wall = clock_.seconds();
+  if (wall < kSoon || processor <= 0) return 1;
+  return std::clamp(wall * threadsOf(options_) / processor, 1.0, kMost);
 }
 
 void Publisher::giveUpIfTooLong(const Progress& p) {
@@ -162,32 +194,71 @@ void Publisher::giveUpIfTooLong(const Progress& p) {
 std::vector<Publication> Publisher::round(const Progress& p) {
   std::vector<Publication> news;
   collect(news);
+  // Combining tells two samples from each other, at least: after the first round there has to be time for another.
+  if (combines_ && (p.round == 1 || !combinesLast_))
+    combinesLast_ =
+        options_.limit.left() - p.seconds / static_cast<double>(std::max<uint64_t>(1, p.round)) >= lastCost(true);
   giveUpIfTooLong(p);
+  if (hasImage() && schedule_.looksAt(p)) {
+    look(p, news);
+    if (reached_) return news;
+  }
   PublicationSchedule::Due due = schedule_.due(p);
   due.image = due.image && hasImage() && imageJob_.idle();
   due.state = due.state && !options_.checkpoint.empty() && stateJob_.idle();
   if (due.state) saveState(p, news);
-  if (due.image) publishImage(p, due.combined);
+  if (due.image) publishImage(p, due.combined, helpers_);
   schedule_.begun(due, p);
   return news;
+}
+
+// Nothing when the time for it is not there, or was not enough.
+std::optional<WrittenImage> Publisher::writeCombined(Estimates& estimates, const Plane<float>* alpha) {
+  const double mayTake = options_.limit.left() + options_.limit.grace() - lastCost(false);
+  if (!combinesLast_ || mayTake < lastCost(true) - lastCost(false)) return std::nullopt;
+  cancel_ = false;
+  std::optional<Alarm> alarm;
+  if (options_.limit.exists()) alarm.emplace(mayTake, [this] { cancel_ = true; });
+  try {
+    WrittenImage written = writeImage(options_.image, estimates, alpha, options_.threads, &cancel_);
+    if (!written.cancelled) return written;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception&) {
+    if (!cancel_) throw;  // what a cancelled method throws is no news
+  }
+  return std::nullopt;
+}
+
+std::string Publisher::leftOut() const {
+  return fmt::format(
+      "--time {}: the image is not combined, for that would take longer: give more time, or combine it "
+      "later (--aovs all, then braid combine)",
+      formatSeconds(options_.limit.seconds()));
 }
 
 WrittenImage Publisher::writeLast(Estimates estimates, const std::optional<Plane<float>>& alpha) {
   const Plane<float>* coverage = alpha ? &*alpha : nullptr;
   const std::vector<Attribute> attributes = estimates.attributes;
   const size_t count = estimates.estimates.size();
+  bool outOfMemory = false;
   try {
-    return writeImage(options_.image, estimates, coverage, options_.threads);
+    if (!combines_) return writeImage(options_.image, estimates, coverage, options_.threads);
+    if (const std::optional<WrittenImage> written = writeCombined(estimates, coverage)) return *written;
   } catch (const std::bad_alloc&) {
     if (!combines_) throw;
+    outOfMemory = true;
   }
   // Without what may have been added for the combined file.
   estimates.attributes = attributes;
   estimates.estimates.resize(std::min(count, estimates.estimates.size()));
-  writeImage(withoutCombining(options_.image), estimates, coverage, options_.threads);
-  throw Error(ExitCode::OutOfMemory,
-              "out of memory while combining; the image was saved without it: combine its file elsewhere (braid "
-              "combine), or lower --size");
+  WrittenImage plain = writeImage(withoutCombining(options_.image), estimates, coverage, options_.threads);
+  if (outOfMemory)
+    throw Error(ExitCode::OutOfMemory,
+                "out of memory while combining; the image was saved without it: combine its file elsewhere (braid "
+                "combine), or lower --size");
+  plain.warnings.push_back(leftOut());
+  return plain;
 }
 
 WrittenImage Publisher::finish() {
@@ -200,19 +271,24 @@ WrittenImage Publisher::finish() {
   std::exception_ptr failure;
   if (!options_.checkpoint.empty()) {
     try {
-      writeStateFile(options_.checkpoint, film);
+      const std::shared_ptr<OutputFile> file = beginStateFile(options_.checkpoint, film);
+      stateJob_.start([file] { file->finish(); });  // the disk works beside what follows
     } catch (const Error&) {
       failure = std::current_exception();
     }
   }
   WrittenImage written;
-  if (hasImage()) {
+  if (last_) {
+    written = *last_;
+  } else if (hasImage()) {
     Estimates estimates = describedEstimates(film, session_.plan().settings.quarters, !options_.image.noTiming);
     const std::optional<Plane<float>> alpha =
         film.coverage ? std::optional(film.coverage->mean()) : std::optional<Plane<float>>();
     film = {};  // what it held is what combiners take
     written = writeLast(std::move(estimates), alpha);
   }
+  std::exception_ptr ofDisk;
+  if (stateJob_.collectLast(ofDisk) && !failure) failure = ofDisk;
   if (failure) std::rethrow_exception(failure);
   return written;
 }

@@ -5,8 +5,10 @@
 #pragma once
 
 #include <atomic>
+#include <ctime>
 #include <exception>
 #include <functional>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
@@ -16,6 +18,7 @@
 #include "renderer/core/stopwatch.h"
 #include "tools/image_output.h"
 #include "tools/publication_schedule.h"
+#include "tools/run_clock.h"
 
 namespace braid {
 
@@ -31,6 +34,8 @@ class BackgroundJob {
   void wait();
   // Once after the task has ended: true, and what it threw if anything.
   bool collect(std::exception_ptr& failure);
+  // The same after waiting for the end.
+  bool collectLast(std::exception_ptr& failure);
 
  private:
   std::thread thread_;
@@ -43,7 +48,9 @@ struct PublishOptions {
   std::string checkpoint;  // empty: none
   double saveEvery = 60;   // seconds
   double targetError = 0;  // 0: none
+  bool endless = false;    // nothing but the target ends the run
   int threads = 0;         // of the render
+  TimeLimit limit;         // of the process: the last image has to be written by then
 };
 
 // Something that was published, or was to be.
@@ -65,8 +72,12 @@ class Publisher {
   // not be, is returned.
   std::vector<Publication> round(const Progress& progress);
 
-  // For Session::run(): the published error met the target.
+  // For Session::run(): the error of the image met the target.
   const std::atomic<bool>& reached() const { return reached_; }
+
+  // For Session::setTimeLeft(): the seconds that passes may take until finish() has to begin. Where the limit does not
+  // leave enough for combining the last image, that is left out rather than samples.
+  double timeLeft() const;
 
   // What was published on the way has taken of the whole machine, in seconds: holding up the passes, and the work
   // beside them.
@@ -77,12 +88,20 @@ class Publisher {
   WrittenImage finish();
 
  private:
-  void collect(std::vector<Publication>& news);
+  // What is done; `wait`: what is under way, too.
+  void collect(std::vector<Publication>& news, bool wait = false);
   void fail(std::vector<Publication>& news, const std::exception_ptr& failure, const Publication& of);
   void saveState(const Progress& progress, std::vector<Publication>& news);
-  void publishImage(const Progress& progress, bool combined);
+  void publishImage(const Progress& progress, bool combined, int threads);
+  // Makes the image of now, all threads at it, and sees whether it is good enough.
+  void look(const Progress& progress, std::vector<Publication>& news);
   void giveUpIfTooLong(const Progress& progress);
   WrittenImage writeLast(Estimates estimates, const std::optional<Plane<float>>& alpha);
+  std::optional<WrittenImage> writeCombined(Estimates& estimates, const Plane<float>* alpha);
+  std::string leftOut() const;
+  // An image is expected to take so many seconds now.
+  double lastCost(bool combined) const { return schedule_.cost(combined, slowdown()); }
+  double slowdown() const;
   bool hasImage() const { return options_.image.show || !options_.image.files().empty(); }
 
   const PublishOptions options_;
@@ -90,12 +109,15 @@ class Publisher {
   Session& session_;
   PublicationSchedule schedule_;
   int helpers_ = 1;          // threads of a publication
-  double machineShare_ = 1;  // of the machine that they are
+  double machineShare_ = 1;  // of the machine that the threads at work are
+  bool combinesLast_;        // the last image, too: there is time for it
   std::atomic<bool> reached_{false}, cancel_{false};
   Publication pending_, saving_;
-  double heldUp_ = 0;  // seconds for which the pending publication stopped the pass loop
-  double took_ = 0;    // seconds of the job beside it
-  Stopwatch jobClock_;
+  std::optional<WrittenImage> last_;  // of the look that ended the run: nothing is left to do
+  double heldUp_ = 0;                 // seconds for which the pending publication stopped the pass loop
+  double took_ = 0;                   // seconds of the job beside it
+  Stopwatch jobClock_, clock_;
+  std::clock_t processor_ = std::clock();  // by then, what the process had taken of it
   std::set<std::string> told_;
   BackgroundJob imageJob_, stateJob_;
 };

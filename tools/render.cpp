@@ -15,10 +15,13 @@
 #include "tools/combining.h"
 #include "tools/header.h"
 #include "tools/interrupt.h"
+#include "tools/keep_until_exit.h"
+#include "tools/late_first_pass.h"
 #include "tools/memory_plan.h"
 #include "tools/output_options.h"
 #include "tools/progress_line.h"
 #include "tools/publisher.h"
+#include "tools/run_clock.h"
 #include "tools/scene_identity.h"
 #include "tools/tev_client.h"
 #include "version.h"
@@ -109,19 +112,36 @@ nlohmann::json errorOrNull(const std::optional<double>& error) {
   return error ? nlohmann::json(*error) : nlohmann::json(nullptr);
 }
 
-nlohmann::json resultRecord(const RunReport& r, const RenderOptions& o, double loadSeconds, const Scene& scene,
+// `began`, `ended`: of the pass loop, by the clock of the process. What is not the loop's or combining is writing.
+RunTimes timesOf(const LoadTimes& load, const BuildTimes& build, double began, double ended,
+                 const WrittenImage& written) {
+  RunTimes t;
+  t.load = load.load;
+  t.prepare = build.prepare;
+  t.hierarchy = build.hierarchy;
+  t.start = std::max(0.0, began - t.load - t.prepare - t.hierarchy);
+  t.render = ended - began - written.secondsOfRun;
+  t.combine = written.combineSeconds;
+  t.total = processSeconds();
+  t.write = std::max(0.0, t.total - t.beforeRender() - t.render - t.combine);
+  return t;
+}
+
+nlohmann::json resultRecord(const RunReport& r, const RenderOptions& o, const RunTimes& times,
                             const WrittenImage& written) {
   return {{"status", r.reason == StopReason::Cancelled ? "interrupted" : "done"},
           {"reason", toString(r.reason)},
           {"spp", r.spp},
           {"estimatedError", errorOrNull(written.error)},
           {"seconds",
-           {{"load", loadSeconds},
-            {"prepare", scene.buildTimes().prepare},
-            {"hierarchy", scene.buildTimes().hierarchy},
-            {"render", r.seconds},
-            {"combine", written.combineSeconds},
-            {"write", written.writeSeconds}}},
+           {{"start", times.start},
+            {"load", times.load},
+            {"prepare", times.prepare},
+            {"hierarchy", times.hierarchy},
+            {"render", times.render},
+            {"combine", times.combine},
+            {"write", times.write},
+            {"total", times.total}}},
           {"paths", r.paths},
           {"rays", r.rays + r.shadowRays},
           {"rejectedSamples", r.rejected},
@@ -136,7 +156,7 @@ std::string describe(const RunReport::RejectedSample& r, const RenderOptions& o)
                      r.integrator, r.pass, r.x, r.y, o.scene.size, o.samples.seed);
 }
 
-void tellResult(const RunReport& r, const RenderOptions& o, const WrittenImage& written) {
+void tellResult(const RunReport& r, const RenderOptions& o, const RunTimes& t, const WrittenImage& written) {
   for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
   if (r.rejected > 0) fmt::print(stderr, "warning: {} non-finite or negative samples counted as 0\n", r.rejected);
   if (r.firstRejected) fmt::print(stderr, "one of them: {}\n", describe(*r.firstRejected, o));
@@ -146,10 +166,13 @@ void tellResult(const RunReport& r, const RenderOptions& o, const WrittenImage& 
     fmt::print(stderr, "Saved: {}\n", file);
     outputs += (outputs.empty() ? "" : ", ") + file;
   }
-  const double perSecond = r.seconds > 0 ? 1e-6 / r.seconds : 0;
-  fmt::print(stderr, "{} spp in {} ({:.2f} M paths/s, {:.1f} M rays/s), {}stopped by {}: {}\n", r.spp,
-             formatSeconds(r.seconds), static_cast<double>(r.paths) * perSecond,
-             static_cast<double>(r.rays + r.shadowRays) * perSecond,
+  const double perSecond = t.render > 0 ? 1e-6 / t.render : 0;
+  fmt::print(stderr,
+             "{} spp in {} (start and load {}, render {}, combine {}, write {}; {:.2f} M paths/s, {:.1f} M rays/s), ",
+             r.spp, formatHundredths(t.total), formatHundredths(t.beforeRender()), formatHundredths(t.render),
+             formatHundredths(t.combine), formatHundredths(t.write), static_cast<double>(r.paths) * perSecond,
+             static_cast<double>(r.rays + r.shadowRays) * perSecond);
+  fmt::print(stderr, "{}stopped by {}: {}\n",
              written.error ? fmt::format("estimated error {:.3g}, ", *written.error) : "", toString(r.reason), outputs);
 }
 
@@ -206,7 +229,7 @@ class Viewer {
 // What the run comes to: interrupted, short of its target, or neither.
 int exitCode(const RunReport& result, const RenderOptions& o, const WrittenImage& written) {
   if (result.reason == StopReason::Cancelled) return static_cast<int>(ExitCode::Interrupted);
-  if (o.error <= 0 || result.reason == StopReason::Error || (written.error && *written.error <= o.error)) return 0;
+  if (o.error <= 0 || (written.error && *written.error <= o.error)) return 0;
   fmt::print(stderr, "--error {} was not reached: the estimated error is {}: give more --spp or --time\n", o.error,
              written.error ? fmt::format("{:.3g}", *written.error) : "not known");
   return static_cast<int>(ExitCode::TargetNotReached);
@@ -225,7 +248,7 @@ int runRender(const RenderOptions& o) {
   LoadTimes times;
   SceneData data = loadScene(o.scene, &times);
   const CameraData camera = chooseCamera(data, o.scene);
-  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
+  std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
   const auto integrators = makeIntegrators();
   Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
   // The passes of all machines will be combined, of which a share has few.
@@ -233,7 +256,8 @@ int runRender(const RenderOptions& o) {
   if (!o.image.files().empty()) requireRunnable(recipe, o.image.combine.wanted());
   const MemoryPlan memory = planMemory(*scene, plan, recipe, settings.spp);
   requireWithinLimit(memory);
-  Session session(*scene, std::move(plan));
+  auto ownedSession = std::make_unique<Session>(*scene, std::move(plan));
+  Session& session = *ownedSession;
   session.identify(BRAID_VERSION, BRAID_BUILD_FLAGS, sceneIdentity(o.scene, scene->data()),
                    planAttributes(*scene, session.plan(), scene->accel().isa()));
   const std::string planText = session.plan().text() + recipeText(recipe) + memory.text();
@@ -243,9 +267,16 @@ int runRender(const RenderOptions& o) {
   earlier.reset();
 
   ProgressLine line(o.scene.quiet);
-  Publisher publisher({viewer.with(o.image), o.checkpoint, saveEvery, o.error, settings.threads}, session);
+  const TimeLimit limit(settings.seconds);
+  Publisher publisher({viewer.with(o.image), o.checkpoint, saveEvery, o.error, settings.spp == 0 && !limit.exists(),
+                       settings.threads, limit},
+                      session);
+  if (limit.exists()) session.setTimeLeft([&] { return publisher.timeLeft(); });
+  LateFirstPass late(limit, session, o.scene.quiet);
+  const double began = processSeconds();
   const RunReport result = session.advance(
       [&](const Progress& p) {
+        late.over(json);
         std::vector<Publication> news = publisher.round(p);
         viewer.addFailure(news);
         tellNews(news, o, json);
@@ -254,11 +285,15 @@ int runRender(const RenderOptions& o) {
         return true;
       },
       &interrupted, nullptr, &publisher.reached());
+  const double ended = processSeconds();
   line.finish();
 
   const WrittenImage written = publisher.finish();
-  if (!o.scene.quiet) tellResult(result, o, written);
-  json.write("end", resultRecord(result, o, times.load, *scene, written));
+  const RunTimes parts = timesOf(times, scene->buildTimes(), began, ended, written);
+  if (!o.scene.quiet) tellResult(result, o, parts, written);
+  json.write("end", resultRecord(result, o, parts, written));
+  keepUntilExit(std::move(ownedSession));
+  keepUntilExit(std::move(scene));
   return exitCode(result, o, written);
 }
 

@@ -70,13 +70,15 @@ class Session::Loop {
   bool limitReached() {
     const Settings& s = plan_.settings;
     if (s.spp > 0 && result_.rounds >= s.spp) return true;
-    const bool late = s.seconds > 0 && seconds() >= s.seconds && result_.rounds > result_.firstRound;
+    // A round that would end too late, as far as the last one tells, is not begun; the first one always is.
+    const bool late = hasTimeLimit() && result_.rounds > result_.firstRound && timeLeft() <= lastRound_;
     if (late) result_.reason = StopReason::Time;
     return late;
   }
 
   // The passes that are missing to the next round, of every integrator. False when abandoned.
   bool round() {
+    const double begin = seconds();
     for (size_t i = 0; i < plan_.integrators.size(); ++i) {
       const Stopwatch clock;
       const uint64_t wanted = (result_.rounds + 1) * static_cast<uint64_t>(plan_.integrators[i].passesPerRound);
@@ -86,6 +88,7 @@ class Session::Loop {
       if (!done) return false;
     }
     ++result_.rounds;
+    lastRound_ = seconds() - begin;
     film_.seconds = startSeconds_ + seconds();
     if (plan_.settings.history && std::has_single_bit(result_.rounds)) session_.keepCheckpoints();
     return true;
@@ -101,8 +104,8 @@ class Session::Loop {
     const uint64_t done = p.round - result_.firstRound;
     if (s.spp > 0 && done > 0)
       p.secondsLeft = p.seconds / static_cast<double>(done) * static_cast<double>(s.spp - p.round);
-    if (s.seconds > 0) {
-      const double left = std::max(0.0, s.seconds - p.seconds);
+    if (hasTimeLimit()) {
+      const double left = std::max(0.0, timeLeft());
       p.secondsLeft = p.secondsLeft < 0 ? left : std::min(p.secondsLeft, left);
     }
     return p;
@@ -111,6 +114,9 @@ class Session::Loop {
   double seconds() const { return clock_.seconds(); }
 
  private:
+  bool hasTimeLimit() const { return session_.timeLeft_ || plan_.settings.seconds > 0; }
+  double timeLeft() const { return session_.timeLeft_ ? session_.timeLeft_() : plan_.settings.seconds - seconds(); }
+
   bool pass(size_t i) {
     const Integrator& integrator = *plan_.integrators[i].integrator;
     EstimateState& e = film_.estimates[i];
@@ -139,6 +145,7 @@ class Session::Loop {
   PassStatistics& statistics_;
   RunReport& result_;
   const Stopwatch clock_;
+  double lastRound_ = 0;  // seconds
   PassTarget target_;
   std::vector<std::shared_ptr<const Preparation>> preparations_;
   const double startSeconds_;

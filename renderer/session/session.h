@@ -72,6 +72,10 @@ class Session {
   RunReport advance(const ProgressCallback& progress = {}, const std::atomic<bool>* cancel = nullptr,
                     const std::atomic<bool>* abandon = nullptr, const std::atomic<bool>* reached = nullptr);
 
+  // What ends a run in the place of `seconds` of the settings: the seconds that are left for passes, asked between
+  // rounds.
+  void setTimeLeft(std::function<double()> timeLeft) { timeLeft_ = std::move(timeLeft); }
+
   const Plan& plan() const { return plan_; }
   const TransportContext& context() const { return context_; }
 
@@ -98,6 +102,7 @@ class Session {
   Plan plan_;
   TransportContext context_;
   FilmState film_;
+  std::function<double()> timeLeft_;  // or none: by the settings
 };
 
 }  // namespace braid
