@@ -114,12 +114,14 @@ TEST_CASE("known light: a rectangle parallel to the floor, also off centre") {
   }
 }
 
-TEST_CASE("known light: a point light falls off by the inverse square and ends at its range") {
+TEST_CASE("known light: a point light falls off by the inverse square and fades within its range") {
   for (const float x : {0.0f, 1.0f, 3.0f}) {
     PunctualLight light = lightOfKind(PunctualKind::Point);
     checkPunctual(light, {x, 0, 0}, inverseSquare(static_cast<double>(x)));
     light.range = 2.5f;
-    checkPunctual(light, {x, 0, 0}, x > 1.5f ? 0.0 : inverseSquare(static_cast<double>(x)));
+    const double distance2 = sqr(static_cast<double>(x)) + 4;
+    checkPunctual(light, {x, 0, 0},
+                  inverseSquare(static_cast<double>(x)) * std::max(0.0, 1 - sqr(distance2 / sqr(2.5))));
   }
 }
 
