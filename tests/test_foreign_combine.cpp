@@ -5,7 +5,7 @@
 
 #include "combiners/registry.h"
 #include "combiners/spatial_variance.h"
-#include "tests/combiner_fixture.h"
+#include "tests/every_method.h"
 #include "tests/command_line.h"
 #include "tests/foreign_files.h"
 #include "tests/render_fixture.h"
@@ -308,6 +308,15 @@ TEST_CASE("View layers are named, and a user chooses another") {
   const Run run = combined(folder, "--unbiased layers.exr:Wood --method nlm -o o.exr", 2);
   CHECK(contains(run.err, "no layer 'Wood'; it has 'Glass', 'ViewLayer', 'Composite'"));
   combined(folder, "--unbiased layers.exr:ViewLayer --method nlm -o o.exr");
+
+  combined(folder, "--unbiased layers.exr:ViewLayer --reference layers.exr:ViewLayer --method ideal@nlm -o i.exr");
+  CHECK(relativeDistance(readImage(folder.path / "i.exr").rgb(), c.pt().mean) < 1e-5);
+
+  // A pass without a view layer.
+  ForeignChannels odd;
+  odd.add(".Combined", "RGB", c.pt().mean);
+  writeForeign(folder.path / "odd.exr", odd);
+  CHECK(identical(read("odd.exr", nullptr).estimates[0].mean, c.pt().mean));
 }
 
 TEST_CASE("Images that do not belong together are refused, naming both") {

@@ -79,10 +79,15 @@ Estimates readBiased(const std::string& text, const ReadOptions& options) {
   return all;
 }
 
-Rgb<float> readReferenceImage(const std::string& file, const Inputs& in) {
-  const ImageFile image = readImage(file);
-  requireSameView(in.head, image);
-  return image.rgb("");
+// The image of the file, or of a view layer.
+Rgb<float> readReferenceImage(const std::string& text, const Inputs& in) {
+  ReadOptions read;
+  read.role = ImageRole::Denoised;
+  read.like = &in.head;
+  Estimates all = readEstimatesOption(text, read);
+  std::error_code ignored;
+  const ImageFile file = std::filesystem::exists(text, ignored) ? readImage(text) : ImageFile();
+  return hasLayer(file, "") ? file.rgb("") : std::move(all.estimates.front().mean);
 }
 
 // Files that methods read themselves.

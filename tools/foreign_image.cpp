@@ -78,7 +78,7 @@ Names viewLayersOf(const Names& layers) {
   for (const std::string& layer : layers) {
     const std::string name = lower(lastPart(layer));
     const size_t dot = layer.rfind('.');
-    if (dot == std::string::npos || (name != "combined" && name != "noisy image")) continue;
+    if (dot == std::string::npos || dot == 0 || (name != "combined" && name != "noisy image")) continue;
     if (const std::string view = layer.substr(0, dot); std::find(views.begin(), views.end(), view) == views.end())
       views.push_back(view);
   }
