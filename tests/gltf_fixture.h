@@ -183,7 +183,9 @@ std::string errorOf(const Load& load, ExitCode code = ExitCode::BadInput) {
   return {};
 }
 
-inline std::string errorOf(const GltfFile& file, const LoadOptions& options = {}) {
+// The same of a file with --strict, which refuses every problem.
+inline std::string errorOf(const GltfFile& file, LoadOptions options = {}) {
+  options.strict = true;
   return errorOf([&] { file.load(options); });
 }
 

@@ -210,6 +210,28 @@ TEST_CASE("A required extension that is not known is exit code 4") {
   const Run run = braidRun(folder, renderCommand("", "future.glb"));
   CHECK(run.code == 4);
   CHECK(contains(run.err, "EXT_unheard_of"));
+  CHECK(braidRun(folder, renderCommand("--ignore-extension EXT_unheard_of", "future.glb")).code == 0);
+}
+
+TEST_CASE("A flaw costs a warning, which header, log and info count; with --strict the render") {
+  const Folder folder;
+  test::GltfFile file = test::triangleFile();
+  file.primitive()["material"] = 5;
+  file.root["materials"] = {{{"alphaMode", "CUTOUT"}}};
+  folder.write("flawed.glb", file.glb());
+  const ImageFile image = rendered(folder, "--log-json log.json", "flawed.glb");
+  const Json info = Json::parse(braidRun(folder, "info flawed.glb --json").out);
+  REQUIRE(!info["warnings"].empty());
+  CHECK(contains(info["warnings"][0].get<std::string>(), "/meshes/0/primitives/0/material: is 5"));
+  REQUIRE(info["notes"].size() == 1);
+  CHECK(contains(info["notes"][0].get<std::string>(), "/materials/0/alphaMode: is 'CUTOUT'"));
+  REQUIRE(attribute(image, "braid/warnings"));
+  CHECK(attribute(image, "braid/warnings")->integer == static_cast<int64_t>(info["warnings"].size()));
+  CHECK(records(folder.path / "log.json").back()["warnings"] == info["warnings"]);
+  const Run strict = braidRun(folder, renderCommand("--strict", "flawed.glb"));
+  CHECK(strict.code == 2);
+  CHECK(contains(strict.err, "flawed.glb: /materials/0/alphaMode"));
+  CHECK(contains(strict.err, "flawed.glb: /meshes/0/primitives/0/material"));
 }
 
 TEST_CASE("An output that cannot be written is exit code 3 and leaves the previous file alone") {

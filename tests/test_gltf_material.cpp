@@ -167,7 +167,7 @@ TEST_CASE("gltf: KHR_texture_transform becomes a matrix and may choose the uv se
   CHECK(moved.y == doctest::Approx(0.5 - 2));
 }
 
-TEST_CASE("gltf: uv sets beyond the second are moved into the two slots") {
+TEST_CASE("gltf: uv sets of any number are moved into the slots of a mesh") {
   GltfFile file = quadFile();
   file.primitive()["attributes"]["TEXCOORD_2"] = file.accessor<float>({2, 2, 2, 2, 2, 2, 2, 2}, "VEC2");
   file.primitive()["attributes"]["TEXCOORD_3"] = file.accessor<float>({3, 3, 3, 3, 3, 3, 3, 3}, "VEC2");
@@ -185,7 +185,19 @@ TEST_CASE("gltf: uv sets beyond the second are moved into the two slots") {
   SUBCASE("three sets") {
     material["normalTexture"] = {{"index", texture}};
     giveMaterial(file, material);
-    CHECK(hasWarning(file.load(), "more than two uv sets"));
+    const SceneData scene = file.load();
+    const Material& m = scene.materials[0];
+    CHECK(scene.meshes[0].uv[m.baseColorTexture.uvSet][0] == Vec2(3));
+    CHECK(scene.meshes[0].uv[m.emissiveTexture.uvSet][0] == Vec2(2));
+    CHECK(scene.meshes[0].uv[m.normalTexture.uvSet][0] == Vec2(0, 1));
+  }
+  SUBCASE("more sets than a mesh holds") {
+    const char* const names[] = {"clearcoatTexture", "clearcoatRoughnessTexture", "clearcoatNormalTexture"};
+    material["extensions"]["KHR_materials_clearcoat"]["clearcoatFactor"] = 1;
+    for (int i = 0; i < 3; ++i)
+      material["extensions"]["KHR_materials_clearcoat"][names[i]] = {{"index", texture}, {"texCoord", 4 + i}};
+    giveMaterial(file, material);
+    CHECK(hasWarning(file.load(), "more than 4 uv sets"));
   }
   SUBCASE("a set that the mesh does not have") {
     material["emissiveTexture"]["texCoord"] = 5;

@@ -113,7 +113,12 @@ void addSceneOptions(CLI::App& command, SceneChoice& c) {
   command.add_flag("--no-default-light", c.noDefaultLight,
                    "No grey dome where the file's lights leave the picture dark");
   command.add_flag("--allow-external", c.load.allowExternal,
-                   "Follow symbolic links that lead from the scene's folder to elsewhere");
+                   "Read files outside of the scene's folder too: ../, absolute paths, symbolic links");
+  command.add_flag("--strict", c.load.strict, "Refuse a file with any problem, listing all of them (exit code 2)");
+  command
+      .add_option("--ignore-extension", c.load.ignoredExtensions,
+                  "Render although the file requires this unknown extension (repeatable)")
+      ->allow_extra_args(false);
   command.add_flag("--double-sided", c.load.doubleSided, "Treat every material as double-sided");
   command.add_flag("--full", c.full, "Leave nothing out that the scene does not need (same pixels, for checking)");
   command.add_option("--isa", c.isa, "Instruction set for Embree: avx2, avx512, sse4.2, or 'auto'")
@@ -151,6 +156,7 @@ SceneData loadScene(const SceneChoice& c, LoadTimes* times) {
   LoadOptions options = c.load;
   options.defaultLight = !c.noDefaultLight && c.environment.empty();
   options.keepAllAttributes = c.full;
+  options.camera = c.lookAt.empty() ? c.camera : "none";
   if (c.frameScene >= 0) options.scene = c.frameScene;
   if (c.frameTime >= 0) options.frameTime = static_cast<float>(c.frameTime);
   const LogSink sink = [&c](LogLevel level, const std::string& line) {

@@ -67,6 +67,7 @@ std::vector<Attribute> planAttributes(const Scene& scene, const Plan& plan, cons
       text("braid/isa", isa),
       text("braid/scene", scene.data().file),
       text("braid/sceneHash", hexString(scene.data().contentHash)),
+      integer("braid/warnings", scene.data().warnings.size()),
       text("braid/plan", plan.text()),
       text("braid/planHash", hexString(plan.hash())),
       text("braid/seed", std::to_string(s.seed)),

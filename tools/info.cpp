@@ -65,7 +65,8 @@ nlohmann::json describe(const Scene& scene) {
           {"extensionsIgnored", data.extensionsIgnored},
           {"variants", data.variants},
           {"scenes", data.sceneNames},
-          {"warnings", data.warnings}};
+          {"warnings", data.warnings},
+          {"notes", data.notes}};
 }
 
 void print(const nlohmann::json& j) {
@@ -90,6 +91,8 @@ void print(const nlohmann::json& j) {
     fmt::print("  {:<11} {} '{}', {:.6g} s\n", i == 0 ? "animations" : "", i, a["name"].get<std::string>(),
                a["seconds"].get<double>());
   }
+  fmt::print("  warnings    {}\n", j["warnings"].size());
+  for (const auto& note : j["notes"]) fmt::print("  note        {}\n", note.get<std::string>());
 }
 
 int runInfo(InfoOptions o) {

@@ -127,7 +127,7 @@ RunTimes timesOf(const LoadTimes& load, const BuildTimes& build, double began, d
   return t;
 }
 
-nlohmann::json resultRecord(const RunReport& r, const RenderOptions& o, const RunTimes& times,
+nlohmann::json resultRecord(const RunReport& r, const RenderOptions& o, const RunTimes& times, const Scene& scene,
                             const WrittenImage& written) {
   return {{"status", r.reason == StopReason::Cancelled ? "interrupted" : "done"},
           {"reason", toString(r.reason)},
@@ -145,6 +145,7 @@ nlohmann::json resultRecord(const RunReport& r, const RenderOptions& o, const Ru
           {"paths", r.paths},
           {"rays", r.rays + r.shadowRays},
           {"rejectedSamples", r.rejected},
+          {"warnings", scene.data().warnings},
           {"outputs", o.files()}};
 }
 
@@ -291,7 +292,7 @@ int runRender(const RenderOptions& o) {
   const WrittenImage written = publisher.finish();
   const RunTimes parts = timesOf(times, scene->buildTimes(), began, ended, written);
   if (!o.scene.quiet) tellResult(result, o, parts, written);
-  json.write("end", resultRecord(result, o, parts, written));
+  json.write("end", resultRecord(result, o, parts, *scene, written));
   keepUntilExit(std::move(ownedSession));
   keepUntilExit(std::move(scene));
   return exitCode(result, o, written);

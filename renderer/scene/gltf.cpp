@@ -16,34 +16,6 @@ namespace {
 
 using namespace gltf;
 
-void checkAsset(const JsonRef& asset) {
-  const std::string version =
-      asset.required("write {\"version\": \"2.0\"}")["version"].required("write \"2.0\"").text("2.0");
-  if (!version.starts_with("2.")) asset["version"].problem("is " + quoted(version) + "; convert the file to glTF 2.0");
-  const std::string minimum = asset["minVersion"].text("2.0");
-  if (minimum != "2.0")
-    asset["minVersion"].problem("is " + quoted(minimum) + "; only glTF 2.0 can be read: convert the file");
-}
-
-// Everything that can be wrong is found before anything is built.
-void readDocument(Document& document, const std::string& path) {
-  readContainer(document, path);
-  const JsonRef root(document.root.get(), "", &document.report);
-  if (!root.isObject()) document.report.throwIfBroken(path);
-  checkExtensions(document, root);
-  checkAsset(root["asset"]);
-  parseData(document, root);
-  parseMaterials(document, root);
-  parseMeshes(document, root);
-  parseCamerasAndLights(document, root);
-  parseNodes(document, root);
-  parseAnimations(document, root);
-  readBuffers(document);
-  resolveViews(document);
-  validate(document);
-  document.report.throwIfBroken(path);
-}
-
 void addDefaults(SceneData& scene, const LoadOptions& options, Report& report) {
   if (scene.instances.empty()) report.warn("", "there are no triangles to draw");
   if (scene.cameras.empty()) {
@@ -64,12 +36,13 @@ void addDefaults(SceneData& scene, const LoadOptions& options, Report& report) {
 SceneData describe(const Document& document) {
   SceneData scene;
   scene.file = document.path;
-  scene.extensionsUsed = document.extensionsUsed;
-  scene.extensionsRequired = document.extensionsRequired;
+  scene.extensionsUsed = document.model.extensionsUsed;
+  scene.extensionsRequired = document.model.extensionsRequired;
   scene.extensionsIgnored = document.extensionsIgnored;
   scene.variants = document.variants;
-  for (const SceneSource& source : document.scenes) scene.sceneNames.push_back(source.name);
-  for (const Animation& a : document.animations) scene.animations.push_back({a.name, clipSeconds(document, a)});
+  for (const tinygltf::Scene& source : document.model.scenes) scene.sceneNames.push_back(source.name);
+  for (const tinygltf::Animation& a : document.model.animations)
+    scene.animations.push_back({a.name, clipSeconds(document, a)});
   return scene;
 }
 
@@ -77,16 +50,26 @@ SceneData describe(const Document& document) {
 
 SceneData loadGltf(const std::string& path, const LoadOptions& options, const LogSink& log) {
   Document document;
-  document.allowExternal = options.allowExternal;
+  document.options = options;
   readDocument(document, path);
+  resolveViews(document);
+  readMaterials(document);
+  readCamerasAndLights(document);
+  validate(document);
   SceneData scene = describe(document);
   MaterialTable materials(document, scene, options.doubleSided);
   buildScene(document, options, materials, scene);
   materials.loadTextures();
-  document.report.throwIfBroken(path);
+  if (options.strict) document.report.throwIfBroken(path);
+  // A file that never had a surface is no flaw; one that lost them all has nothing to show.
+  if (scene.instances.empty()) {
+    document.report.throwIfBroken(path, &document.usage);
+    document.report.throwIfBroken(path);
+  }
   addDefaults(scene, options, document.report);
   scene.contentHash = document.hash.value();
-  scene.warnings = document.report.warningLines();
+  scene.warnings = document.report.lines(document.usage, true);
+  scene.notes = document.report.lines(document.usage, false);
   if (log) {
     for (const std::string& line : scene.warnings) log(LogLevel::Warning, path + ": " + line);
   }

@@ -31,102 +31,90 @@ class Animator {
  public:
   Animator(Document& document, float time) : document_(document), time_(time) {}
 
-  void apply(const AnimationChannel& channel) {
-    const std::vector<float>& times = floats(channel.input);
-    if (times.empty()) return;
-    if (!isIncreasing(channel, times)) return;
-    Node& node = document_.nodes[channel.node];
-    if (node.matrix && channel.path != AnimatedPath::Weights) {
-      document_.report.warn(channel.pointer, "an animated node has a matrix; it stays at rest");
+  void apply(const tinygltf::Animation& animation, const tinygltf::AnimationChannel& channel,
+             const std::string& place) {
+    if (channel.sampler < 0) return;
+    const tinygltf::AnimationSampler& sampler = animation.samplers[static_cast<size_t>(channel.sampler)];
+    document_.useAccessor(sampler.input);
+    document_.useAccessor(sampler.output);
+    const size_t width = animatedWidth(document_, channel);
+    if (width == 0) return;
+    if (sampler.input < 0 || sampler.output < 0) return;
+    // Broken accessors have no values.
+    const std::vector<float>& times = floats(sampler.input);
+    const size_t perKey = (sampler.interpolation == "CUBICSPLINE" ? 3 : 1) * width;
+    if (times.empty() || floats(sampler.output).size() < times.size() * perKey || !isOrdered(place, times)) return;
+    tinygltf::Node& node = document_.model.nodes[static_cast<size_t>(channel.target_node)];
+    if (!node.matrix.empty() && channel.target_path != "weights") {
+      document_.report.warn(place, "an animated node has a matrix; it stays at rest");
       return;
     }
-    const size_t width = widthOf(channel, node);
-    if (width == 0) return;
-    const std::vector<float> value = evaluate(channel, findKeys(times, time_), width);
-    if (std::all_of(value.begin(), value.end(), [](float v) { return std::isfinite(v); })) {
-      assign(node, channel.path, value);
+    const std::vector<double> value = evaluate(sampler, channel, findKeys(times, time_), width);
+    if (std::all_of(value.begin(), value.end(), [](double v) { return std::isfinite(v); })) {
+      assign(node, channel.target_path, value);
     } else {
-      document_.report.warn(channel.pointer,
-                            "an animation yields values that are not finite; its target stays at rest");
+      document_.report.warn(place, "an animation yields values that are not finite; its target stays at rest");
     }
   }
 
  private:
-  bool isIncreasing(const AnimationChannel& channel, const std::vector<float>& times) {
+  // Two keys at one time are a jump, which many programs write. Times that go back say nothing.
+  bool isOrdered(const std::string& place, const std::vector<float>& times) {
+    bool jumps = false;
     for (size_t i = 0; i < times.size(); ++i) {
-      if (std::isfinite(times[i]) && (i == 0 || times[i] > times[i - 1])) continue;
-      document_.report.warn(channel.pointer, "the key times of an animation do not increase; it is ignored");
-      return false;
+      if (!std::isfinite(times[i]) || (i > 0 && times[i] < times[i - 1])) {
+        document_.report.warn(place, "the key times of an animation do not increase; it is ignored");
+        return false;
+      }
+      jumps = jumps || (i > 0 && times[i] == times[i - 1]);
     }
+    if (jumps) document_.report.warn(place, "an animation has two keys at one time; the value jumps there");
     return true;
   }
 
-  size_t widthOf(const AnimationChannel& channel, const Node& node) const {
-    switch (channel.path) {
-      case AnimatedPath::Rotation:
-        return 4;
-      case AnimatedPath::Weights:
-        if (node.mesh == kNone || document_.meshes[node.mesh].primitives.empty()) return 0;
-        return document_.meshes[node.mesh].primitives.front().targets.size();
-      default:
-        return 3;
-    }
-  }
-
-  std::vector<float> evaluate(const AnimationChannel& channel, const KeySpan& span, size_t width) {
-    const bool isCubic = channel.interpolation == Interpolation::Cubic;
-    const std::vector<float>& all = floats(channel.output);
+  std::vector<double> evaluate(const tinygltf::AnimationSampler& sampler, const tinygltf::AnimationChannel& channel,
+                               const KeySpan& span, size_t width) {
+    const bool isCubic = sampler.interpolation == "CUBICSPLINE";
+    const std::vector<float>& all = floats(sampler.output);
     // Cubic keys hold the in-tangent, the value and the out-tangent.
     const auto part = [&](size_t key, size_t which) {
-      return all.data() + (isCubic ? (3 * key + which) : key) * width;
+      const float* first = all.data() + (isCubic ? (3 * key + which) : key) * width;
+      return std::vector<double>(first, first + width);
     };
-    const float* a = part(span.first, 1);
-    const float* b = part(span.second, 1);
-    std::vector<float> result(a, a + width);
-    if (channel.interpolation == Interpolation::Step || span.first == span.second) return result;
+    std::vector<double> a = part(span.first, 1);
+    if (sampler.interpolation == "STEP" || span.first == span.second) return a;
+    const std::vector<double> b = part(span.second, 1);
+    const double f = static_cast<double>(span.fraction);
     if (isCubic) {
-      hermite(result, b, part(span.first, 2), part(span.second, 0), span);
-    } else if (channel.path == AnimatedPath::Rotation) {
-      const glm::dquat q = glm::slerp(quaternion(a), quaternion(b), static_cast<double>(span.fraction));
-      result = {static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z), static_cast<float>(q.w)};
+      hermite(a, b, part(span.first, 2), part(span.second, 0), span);
+    } else if (channel.target_path == "rotation") {
+      const glm::dquat q = glm::slerp(quaternion(a.data()), quaternion(b.data()), f);
+      a = {q.x, q.y, q.z, q.w};
     } else {
-      for (size_t i = 0; i < width; ++i) result[i] = glm::mix(a[i], b[i], span.fraction);
+      for (size_t i = 0; i < width; ++i) a[i] = glm::mix(a[i], b[i], f);
     }
-    return result;
+    return a;
   }
 
-  static void hermite(std::vector<float>& value, const float* next, const float* out, const float* in,
-                      const KeySpan& span) {
-    const float t = span.fraction, t2 = t * t, t3 = t2 * t, d = span.duration;
+  static void hermite(std::vector<double>& value, const std::vector<double>& next, const std::vector<double>& out,
+                      const std::vector<double>& in, const KeySpan& span) {
+    const double t = static_cast<double>(span.fraction), t2 = t * t, t3 = t2 * t,
+                 d = static_cast<double>(span.duration);
     for (size_t i = 0; i < value.size(); ++i) {
       value[i] = (2 * t3 - 3 * t2 + 1) * value[i] + d * (t3 - 2 * t2 + t) * out[i] + (3 * t2 - 2 * t3) * next[i] +
                  d * (t3 - t2) * in[i];
     }
   }
 
-  static glm::dquat quaternion(const float* v) { return glm::normalize(glm::dquat(v[3], v[0], v[1], v[2])); }
-
-  static void assign(Node& node, AnimatedPath path, const std::vector<float>& value) {
-    switch (path) {
-      case AnimatedPath::Translation:
-        node.translation = glm::dvec3(value[0], value[1], value[2]);
-        break;
-      case AnimatedPath::Scale:
-        node.scale = glm::dvec3(value[0], value[1], value[2]);
-        break;
-      case AnimatedPath::Weights:
-        node.weights = value;
-        break;
-      case AnimatedPath::Rotation: {
-        const glm::dquat q(value[3], value[0], value[1], value[2]);
-        if (glm::length(q) > 1e-6) node.rotation = glm::normalize(q);
-        break;
-      }
-    }
+  static void assign(tinygltf::Node& node, const std::string& path, const std::vector<double>& value) {
+    if (path == "translation") node.translation = value;
+    if (path == "rotation") node.rotation = value;
+    if (path == "scale") node.scale = value;
+    if (path == "weights") node.weights = value;
   }
 
   // Each accessor is read once, however many channels share it.
-  const std::vector<float>& floats(uint32_t accessor) {
+  const std::vector<float>& floats(int accessor) {
     const auto found = cache_.find(accessor);
     if (found != cache_.end()) return found->second;
     return cache_.emplace(accessor, readFloats(document_, accessor)).first->second;
@@ -134,23 +122,43 @@ class Animator {
 
   Document& document_;
   float time_;
-  std::unordered_map<uint32_t, std::vector<float>> cache_;
+  std::unordered_map<int, std::vector<float>> cache_;
 };
 
 }  // namespace
 
-void animate(Document& document, const Animation& animation, float time) {
-  Animator animator(document, time);
-  for (const AnimationChannel& channel : animation.channels) animator.apply(channel);
+size_t animatedWidth(const Document& document, const tinygltf::AnimationChannel& channel) {
+  const std::string& path = channel.target_path;
+  if (channel.target_node < 0) return 0;
+  if (path == "rotation") return 4;
+  if (path == "translation" || path == "scale") return 3;
+  if (path != "weights") return 0;
+  const int mesh = document.model.nodes[static_cast<size_t>(channel.target_node)].mesh;
+  if (mesh < 0 || document.model.meshes[static_cast<size_t>(mesh)].primitives.empty()) return 0;
+  return document.model.meshes[static_cast<size_t>(mesh)].primitives.front().targets.size();
 }
 
-double clipSeconds(const Document& document, const Animation& animation) {
+void animate(Document& document, int clip, float time) {
+  Animator animator(document, time);
+  document.usage.mark("animations", clip);
+  const tinygltf::Animation& animation = document.model.animations[static_cast<size_t>(clip)];
+  for (size_t c = 0; c < animation.channels.size(); ++c) {
+    const std::string place = "/animations/" + std::to_string(clip) + "/channels/" + std::to_string(c);
+    if (animation.channels[c].target_path == "pointer")
+      document.report.warn(place, "animations of other properties (KHR_animation_pointer) are ignored");
+    animator.apply(animation, animation.channels[c], place);
+  }
+}
+
+double clipSeconds(const Document& document, const tinygltf::Animation& animation) {
   double seconds = 0;
-  std::set<uint32_t> inputs;
-  for (const AnimationChannel& channel : animation.channels) {
-    if (!inputs.insert(channel.input).second || document.accessors[channel.input].count == 0) continue;
-    const auto last = static_cast<uint32_t>(document.accessors[channel.input].count - 1);
-    const float time = gatherFloats(document, channel.input, std::span(&last, 1)).front();
+  std::set<int> inputs;
+  for (const tinygltf::AnimationSampler& sampler : animation.samplers) {
+    if (sampler.input < 0 || !inputs.insert(sampler.input).second) continue;
+    const Accessor& times = document.accessor(sampler.input);
+    if (times.count == 0 || times.count > kNone || componentsOf(times) != 1) continue;
+    const auto last = static_cast<uint32_t>(times.count - 1);
+    const float time = gatherFloats(document, sampler.input, std::span(&last, 1)).front();
     if (std::isfinite(time)) seconds = std::max(seconds, static_cast<double>(time));
   }
   return seconds;

@@ -18,14 +18,14 @@ bool isFraction(const std::string& name, const Accessor& accessor) {
 }
 
 float scaleOf(const Accessor& accessor) {
-  switch (accessor.component) {
-    case Component::I8:
+  switch (accessor.componentType) {
+    case kI8:
       return 1.0f / 127;
-    case Component::U8:
+    case kU8:
       return 1.0f / 255;
-    case Component::I16:
+    case kI16:
       return 1.0f / 32767;
-    case Component::U16:
+    case kU16:
       return 1.0f / 65535;
     default:
       return 1;
@@ -62,38 +62,44 @@ bool copyIndices(const draco::Mesh& mesh, std::vector<uint32_t>& indices) {
 
 }  // namespace
 
-std::optional<DracoMesh> decodeDraco(const Document& document, const Primitive& primitive, Report& report) {
-  const std::string where = primitive.pointer + "/extensions/KHR_draco_mesh_compression";
-  const BufferView& view = document.views[primitive.draco->view];
+std::optional<DracoMesh> decodeDraco(const Document& document, const MeshJob& job, Report& report) {
+  const std::string where = job.place + "/extensions/KHR_draco_mesh_compression";
+  const char* const without = "its uncompressed data is drawn, where there is any";
+  const Value& json = member(job.primitive->extensions, "KHR_draco_mesh_compression");
+  const Bytes data = document.views[static_cast<size_t>(index(json, "bufferView"))].data;
   draco::DecoderBuffer buffer;
-  buffer.Init(reinterpret_cast<const char*>(view.data.data()), view.data.size());
+  buffer.Init(reinterpret_cast<const char*>(data.data()), data.size());
   draco::Decoder decoder;
   auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
   if (!decoded.ok()) {
     report.problem(where,
-                   "cannot be decompressed (" + decoded.status().error_msg_string() + "); compress the file again");
+                   "cannot be decompressed (" + decoded.status().error_msg_string() + "); compress the file again",
+                   without);
     return {};
   }
   const draco::Mesh& mesh = *decoded.value();
   DracoMesh out;
   out.vertices = mesh.num_points();
   bool valid = copyIndices(mesh, out.indices);
-  for (const auto& [name, id] : primitive.draco->ids) {
-    const auto declared = primitive.attributes.find(name);
-    if (declared == primitive.attributes.end()) continue;
-    const Accessor& accessor = document.accessors[declared->second];
-    const draco::PointAttribute* source = mesh.GetAttributeByUniqueId(id);
+  const Value& ids = member(json, "attributes");
+  for (const std::string& name : ids.Keys()) {
+    const auto declared = job.primitive->attributes.find(name);
+    if (declared == job.primitive->attributes.end()) continue;
+    const Accessor& accessor = document.accessor(declared->second);
+    const int id = index(ids, name.c_str());
+    const draco::PointAttribute* source = mesh.GetAttributeByUniqueId(static_cast<uint32_t>(id));
     if (!source) {
       report.problem(where + "/attributes/" + name,
-                     "is " + std::to_string(id) + ", which the compressed mesh does not hold; compress the file again");
-      return {};
+                     "is " + std::to_string(id) + ", which the compressed mesh does not hold; compress the file again",
+                     "the attribute is left out");
+      continue;
     }
     const bool whole = source->data_type() != draco::DT_FLOAT32 && source->data_type() != draco::DT_FLOAT64;
     valid = valid && copyAttribute(mesh, *source, whole && isFraction(name, accessor) ? scaleOf(accessor) : 1,
                                    out.attributes[name]);
   }
   if (valid) return out;
-  report.problem(where, "holds values out of range; compress the file again");
+  report.problem(where, "holds values out of range; compress the file again", without);
   return {};
 }
 

@@ -34,6 +34,9 @@ void forEachTexture(MaterialType& m, const Visit& visit) {
   visit(m.iridescenceThicknessTexture, false);
 }
 
+// The image that a texture reads, WebP where there is a choice; -1: none in a supported format.
+int imageOf(const tinygltf::Texture& texture);
+
 // The materials of the kept primitives, in order of first use, with compacted texture and uv indices.
 class MaterialTable {
  public:
@@ -44,22 +47,23 @@ class MaterialTable {
     bool operator==(const TangentSource&) const = default;
   };
   struct Uvs {
-    std::array<uint32_t, 2> set{kNone, kNone};  // the file's uv set behind each slot
-    std::vector<TangentSource> tangents;        // of the frames that the material reads, at least one
+    std::array<uint32_t, kUvSlots> set{kNone, kNone, kNone, kNone};  // the file's uv set behind each slot
+    std::vector<TangentSource> tangents;  // of the frames that the material reads, at least one
   };
 
   MaterialTable(Document& document, SceneData& scene, bool doubleSided)
       : document_(document), scene_(scene), doubleSided_(doubleSided), placed_(document.materials.size() + 1, kNone) {}
 
-  // The index into SceneData::materials for a material of the file; kNone is the default material.
-  uint32_t use(uint32_t fileMaterial);
+  // The index into SceneData::materials for a material of the file; -1 is the default material.
+  uint32_t use(int fileMaterial);
   const Uvs& uvs(uint32_t material) const { return uvs_[material]; }
   // Decodes the images of all used textures in parallel and fills SceneData::textures.
   void loadTextures();
 
  private:
-  Uvs assignUvSlots(Material& material, uint32_t fileMaterial);
-  std::vector<uint32_t> usedImages() const;
+  Uvs assignUvSlots(Material& material, int fileMaterial);
+  std::vector<int> usedImages() const;
+  void dropMissingTextures();
 
   Document& document_;
   SceneData& scene_;

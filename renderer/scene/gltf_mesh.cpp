@@ -23,6 +23,10 @@ class MeshBuilder {
     readTriangles();
     selectVertices();
     mesh_.positions = morphed<Vec3>("POSITION");
+    if (mesh_.positions.size() != vertices_) {
+      report_.problem(job_.place, "holds positions that are no points; compress the file again", "it is left out");
+      return {};
+    }
     mesh_.normals = morphed<Vec3>("NORMAL");
     // Supplied tangents belong to supplied normals; without those they are to be ignored.
     if (!mesh_.normals.empty() && wantsTangents()) readTangents();
@@ -35,9 +39,9 @@ class MeshBuilder {
         skin<double>();  // floats would lose what is left of sums of large numbers
       }
     }
-    if (!dropBadTriangles(mesh_, report_, primitive_.pointer)) return {};
+    if (!dropBadTriangles(mesh_, report_, job_.place)) return {};
     compactVertices(mesh_, extras_);
-    repairNormals(mesh_, report_, primitive_.pointer);
+    repairNormals(mesh_, report_, job_.place);
     finishTangents();
     mesh_.name = job_.name;
     mesh_.material = job_.material;
@@ -48,26 +52,34 @@ class MeshBuilder {
  private:
   bool wantsTangents() const { return job_.needsTangents || job_.keepAllAttributes; }
 
+  // What cannot be drawn at all has no mesh; its flaw was reported.
   bool open() {
+    if (primitive_.mode < 0 || primitive_.indices < -1) return false;
     if (primitive_.mode < 4) {
-      report_.warn(primitive_.pointer, "points and lines are not drawn");
+      report_.warn(job_.place, "points and lines are not drawn");
       return false;
     }
     const auto position = primitive_.attributes.find("POSITION");
     if (position == primitive_.attributes.end()) return false;
-    vertices_ = document_.accessors[position->second].count;
-    if (primitive_.draco) {
-      draco_ = decodeDraco(document_, primitive_, report_);
-      if (!draco_) return false;
-      vertices_ = draco_->vertices;
+    vertices_ = fileVertices_ = document_.accessor(position->second).count;
+    if (isPacked(primitive_)) {
+      if (primitive_.mode == 4 || primitive_.mode == 5) draco_ = decodeDraco(document_, job_, report_);
+      if (!draco_ && !hasData("POSITION")) return false;
+      if (draco_) vertices_ = fileVertices_ = draco_->vertices;
     }
-    fileVertices_ = vertices_;
-    if (vertices_ == 0) report_.warn(primitive_.pointer, "a primitive has no vertices");
     if (vertices_ > std::numeric_limits<uint32_t>::max()) {
-      report_.problem(primitive_.pointer, "has more than 2^32 vertices; split it");
+      report_.problem(job_.place, "has more than 2^32 vertices; split it", "it is left out");
       return false;
     }
     return vertices_ > 0;
+  }
+
+  // Accessors of compressed attributes have no data of their own, which means zeros elsewhere.
+  bool hasData(const std::string& name) const {
+    const auto found = primitive_.attributes.find(name);
+    if (found == primitive_.attributes.end()) return false;
+    const Accessor& accessor = document_.accessor(found->second);
+    return !isPacked(primitive_) || accessor.bufferView >= 0 || accessor.sparse.isSparse;
   }
 
   bool has(const std::string& name) const { return primitive_.attributes.contains(name); }
@@ -82,20 +94,20 @@ class MeshBuilder {
         return std::move(found->second.values);
       }
     }
-    const auto found = primitive_.attributes.find(name);
-    if (found == primitive_.attributes.end()) return {};
-    const Accessor& accessor = document_.accessors[found->second];
+    if (!hasData(name)) return {};
+    const int index = primitive_.attributes.at(name);
+    const Accessor& accessor = document_.accessor(index);
     if (accessor.count != fileVertices_) {
-      report_.warn(primitive_.pointer,
-                   "attribute " + quoted(name) + " does not fit the compressed mesh; it is ignored");
+      if (draco_ && accessor.count > 0)
+        report_.warn(job_.place, "attribute " + quoted(name) + " does not fit the compressed mesh; it is ignored");
       return {};
     }
-    components = accessor.components();
+    components = componentsOf(accessor);
     const bool isFraction = name.starts_with("COLOR_") || name.starts_with("WEIGHTS_");
-    return read(found->second, isFraction ? Integers::AlwaysNormalized : Integers::AsDeclared);
+    return read(index, isFraction ? Integers::AlwaysNormalized : Integers::AsDeclared);
   }
 
-  std::vector<float> read(uint32_t accessor, Integers integers = Integers::AsDeclared) const {
+  std::vector<float> read(int accessor, Integers integers = Integers::AsDeclared) const {
     return selected_.empty() ? readFloats(document_, accessor, integers)
                              : gatherFloats(document_, accessor, selected_, integers);
   }
@@ -107,8 +119,8 @@ class MeshBuilder {
       const float weight = job_.weights[t];
       const auto found = primitive_.targets[t].find(name);
       if (weight == 0 || found == primitive_.targets[t].end()) continue;
-      const Accessor& accessor = document_.accessors[found->second];
-      const uint32_t width = accessor.components();
+      const Accessor& accessor = document_.accessor(found->second);
+      const uint32_t width = componentsOf(accessor);
       if (accessor.count != fileVertices_ || width > components) continue;
       const std::vector<float> delta = read(found->second);
       for (size_t v = 0; v < vertices_; ++v) {
@@ -130,7 +142,7 @@ class MeshBuilder {
     std::vector<uint32_t> indices;
     if (draco_) {
       indices = std::move(draco_->indices);
-    } else if (primitive_.indices != kNone) {
+    } else if (primitive_.indices >= 0) {
       indices = readIntegers(document_, primitive_.indices);
     } else {
       indices.resize(vertices_);
@@ -139,12 +151,19 @@ class MeshBuilder {
     // A compressed strip comes out of its decoder as a list.
     if (primitive_.mode == 4 || draco_) {
       if (indices.size() % 3 != 0)
-        report_.warn(primitive_.pointer, "the number of indices is not a multiple of 3; the rest is ignored");
+        report_.warn(job_.place, "the number of indices is not a multiple of 3; the rest is ignored");
       mesh_.triangles.resize(indices.size() / 3);
       for (size_t i = 0; i < mesh_.triangles.size(); ++i)
         mesh_.triangles[i] = {indices[3 * i], indices[3 * i + 1], indices[3 * i + 2]};
-      return;
+    } else {
+      joinTriangles(indices);
     }
+    // Validation reported the indices of vertices that do not exist: only their triangles are lost.
+    std::erase_if(mesh_.triangles,
+                  [&](const glm::uvec3& t) { return t.x >= vertices_ || t.y >= vertices_ || t.z >= vertices_; });
+  }
+
+  void joinTriangles(const std::vector<uint32_t>& indices) {
     const bool isStrip = primitive_.mode == 5;
     for (size_t i = 0; i + 2 < indices.size(); ++i) {
       const size_t odd = isStrip ? i % 2 : 0;
@@ -176,13 +195,13 @@ class MeshBuilder {
   }
 
   void readUvs() {
-    for (uint32_t slot = 0; slot < 2; ++slot) {
+    for (uint32_t slot = 0; slot < kUvSlots; ++slot) {
       uint32_t set = job_.uvs.set[slot];
       if (set != kNone && !has("TEXCOORD_" + std::to_string(set))) {
-        report_.warn(primitive_.pointer,
+        report_.warn(job_.place,
                      "a texture reads TEXCOORD_" + std::to_string(set) + ", which the primitive does not have");
       }
-      if (set == kNone && job_.keepAllAttributes) set = slot;
+      if (set == kNone && job_.keepAllAttributes && slot < 2) set = slot;
       mesh_.uv[slot] = readUv(set);
       for (Vec2& uv : mesh_.uv[slot]) {
         if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = Vec2(0);
@@ -194,7 +213,10 @@ class MeshBuilder {
       extras_.uv.push_back(slotOf(source.set) == kNone ? readUv(source.set) : std::vector<Vec2>());
   }
 
-  uint32_t slotOf(uint32_t set) const { return slotSet_[0] == set ? 0 : slotSet_[1] == set ? 1 : kNone; }
+  uint32_t slotOf(uint32_t set) const {
+    const auto found = std::find(slotSet_.begin(), slotSet_.end(), set);
+    return found == slotSet_.end() ? kNone : static_cast<uint32_t>(found - slotSet_.begin());
+  }
 
   void readColors() {
     uint32_t components = 0;
@@ -220,6 +242,8 @@ class MeshBuilder {
       for (int c = 0; c < 4; ++c) joint[c] -= glm::dvec4(job_.origin * joint[c].w, 0);
       joints.emplace_back(joint);
     }
+    const auto first = std::find_if(joints.begin(), joints.end(), [](const Matrix<T>& j) { return j[3][3] != 0; });
+    const Matrix<T> atRest = first == joints.end() ? Matrix<T>(1) : *first;
     std::vector<Matrix<T>> blended(vertices_, Matrix<T>(0));
     std::vector<float> total(vertices_, 0.0f);
     for (int set = 0; has("JOINTS_" + std::to_string(set)); ++set)
@@ -228,13 +252,13 @@ class MeshBuilder {
     for (size_t v = 0; v < vertices_; ++v) {
       if (!(total[v] > 1e-6f)) {
         ++unweighted;
-        blended[v] = joints.front();
+        blended[v] = atRest;
         total[v] = 1;
       }
       transformVertex<T>(v, blended[v] * (1 / static_cast<T>(total[v])));
     }
     if (unweighted > 0)
-      report_.warn(primitive_.pointer, "a skinned vertex has no weights; it follows the first joint", unweighted);
+      report_.warn(job_.place, "a skinned vertex has no weights; it follows the first joint", unweighted);
   }
 
   template <class T>
@@ -244,14 +268,14 @@ class MeshBuilder {
     const std::vector<float> joints = values("JOINTS_" + set, jointWidth),
                              weights = values("WEIGHTS_" + set, weightWidth);
     if (jointWidth != 4 || weightWidth != 4) {
-      report_.warn(primitive_.pointer, "JOINTS and WEIGHTS do not match; they are ignored");
+      report_.warn(job_.place, "JOINTS and WEIGHTS do not match; they are ignored");
       return;
     }
     for (size_t i = 0; i < vertices_ * 4; ++i) {
       if (!(weights[i] > 0) || !std::isfinite(weights[i])) continue;
-      // Accessors were validated; a compressed mesh may still name a joint that does not exist.
-      const auto joint = static_cast<size_t>(std::max(joints[i], 0.0f));
-      if (joint >= moves.size()) continue;
+      if (!(joints[i] >= 0 && joints[i] < 1e9f)) continue;
+      const auto joint = static_cast<size_t>(joints[i]);
+      if (joint >= moves.size() || moves[joint][3][3] == 0) continue;
       blended[i / 4] += moves[joint] * static_cast<T>(weights[i]);
       total[i / 4] += weights[i];
     }
@@ -271,14 +295,14 @@ class MeshBuilder {
 
   void finishTangents() {
     if (!wantsTangents()) return;
-    if (!mesh_.tangents.empty() && repairTangents(mesh_, report_, primitive_.pointer)) return;
+    if (!mesh_.tangents.empty() && repairTangents(mesh_, report_, job_.place)) return;
     mesh_.tangents.clear();
     if (!job_.needsTangents) return;
     const size_t frames = job_.uvs.tangents.size();
     extras_.uv.resize(frames);
     for (size_t frame = 0; frame < frames; ++frame) layOut(frame);
     if (std::all_of(extras_.uv.begin(), extras_.uv.end(), [](const auto& uv) { return uv.empty(); })) {
-      report_.warn(primitive_.pointer,
+      report_.warn(job_.place,
                    "a material needs tangents, but the primitive has neither tangents nor texture coordinates");
       return;
     }
@@ -308,7 +332,7 @@ class MeshBuilder {
   uint64_t vertices_ = 0;           // read
   std::vector<uint32_t> selected_;  // which ones, ascending; empty: all
   TriangleMesh mesh_;
-  std::array<uint32_t, 2> slotSet_{kNone, kNone};  // the uv set that each slot holds
+  std::array<uint32_t, kUvSlots> slotSet_{kNone, kNone, kNone, kNone};  // the uv set that each slot holds
   ExtraAttributes extras_;
 };
 
@@ -319,21 +343,24 @@ TriangleMesh buildMesh(const Document& document, const MeshJob& job, Report& rep
     return MeshBuilder(document, job, report).build();
   } catch (const std::bad_alloc&) {
     // A compressed mesh may claim any size.
-    if (!job.primitive->draco) throw;
-    report.problem(job.primitive->pointer, "needs more memory than there is; compress the file again");
+    if (!isPacked(*job.primitive)) throw;
+    report.problem(job.place, "needs more memory than there is; compress the file again", "it is left out");
     return {};
   }
 }
 
+bool isPacked(const Primitive& primitive) { return primitive.extensions.contains("KHR_draco_mesh_compression"); }
+
 uint64_t estimatedBytes(const Document& document, const Primitive& primitive) {
   const auto position = primitive.attributes.find("POSITION");
   if (position == primitive.attributes.end() || primitive.mode < 4) return 0;
-  const uint64_t vertices = document.accessors[position->second].count;
-  const uint64_t indices = primitive.indices == kNone ? vertices : document.accessors[primitive.indices].count;
+  const uint64_t vertices = document.accessor(position->second).count;
+  const uint64_t indices = primitive.indices < 0 ? vertices : document.accessor(primitive.indices).count;
   const uint64_t triangles = primitive.mode == 4 ? indices / 3 : indices;
   // Vertices that no triangle uses are dropped. Decompressing the same data again and again would take for ever too.
   constexpr uint64_t kDracoRatio = 8;
-  const uint64_t compressed = primitive.draco ? document.views[primitive.draco->view].data.size() * kDracoRatio : 0;
+  const int view = index(member(primitive.extensions, "KHR_draco_mesh_compression"), "bufferView");
+  const uint64_t compressed = view < 0 ? 0 : document.views[static_cast<size_t>(view)].data.size() * kDracoRatio;
   return compressed + triangles * sizeof(glm::uvec3) + std::min(vertices, triangles * 3) * 2 * sizeof(Vec3);
 }
 

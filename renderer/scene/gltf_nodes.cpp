@@ -11,7 +11,7 @@ namespace braid::gltf {
 
 namespace {
 
-std::string nodePlace(uint32_t node) { return "/nodes/" + std::to_string(node); }
+std::string nodePlace(int node) { return "/nodes/" + std::to_string(node); }
 
 bool isFiniteMatrix(const Mat4& m) {
   const float* v = glm::value_ptr(m);
@@ -21,7 +21,7 @@ bool isFiniteMatrix(const Mat4& m) {
 // What makes two uses of a primitive the same triangles.
 struct MeshKey {
   const Primitive* primitive;
-  uint32_t skin;
+  int skin;
   std::vector<float> weights;
   auto operator<=>(const MeshKey&) const = default;
 };
@@ -30,9 +30,8 @@ struct MeshKey {
 struct GeometryKey {
   Attributes attributes;
   std::vector<Attributes> targets;
-  uint32_t indices, material, draco;
-  uint64_t mode;
-  std::vector<std::pair<uint32_t, uint32_t>> variants;
+  int indices, material, draco, mode;
+  std::vector<std::pair<int, int>> variants;
   auto operator<=>(const GeometryKey&) const = default;
 };
 
@@ -45,18 +44,19 @@ class SceneBuilder {
         scene_(scene),
         pose_(makePose(document, options)) {
     findVariant();
-    skins_.resize(document.skins.size());
+    skins_.resize(document.model.skins.size());
   }
 
   void build() {
-    for (const uint32_t node : nodesOfScene()) {
+    for (const int node : nodesOfScene()) {
       addCamera(node);
-      if (!pose_.visible[node]) continue;
+      if (!pose_.visible[static_cast<size_t>(node)]) continue;
       addLight(node);
-      if (document_.nodes[node].mesh != kNone) addMesh(node);
+      if (nodeAt(node).mesh >= 0) addMesh(node);
     }
     buildMeshes();
     placeAll();
+    useCamera();
   }
 
  private:
@@ -64,7 +64,7 @@ class SceneBuilder {
     if (options_.variant.empty()) return;
     const auto found = std::find(document_.variants.begin(), document_.variants.end(), options_.variant);
     if (found != document_.variants.end()) {
-      variant_ = static_cast<uint32_t>(found - document_.variants.begin());
+      variant_ = static_cast<int>(found - document_.variants.begin());
       return;
     }
     std::string names;
@@ -74,49 +74,52 @@ class SceneBuilder {
                          (names.empty() ? "the file has no variants" : "the file has " + names));
   }
 
-  std::vector<uint32_t> rootsOfScene() {
-    const size_t count = document_.scenes.size();
-    if (options_.scene && (*options_.scene < 0 || static_cast<size_t>(*options_.scene) >= count)) {
+  const tinygltf::Node& nodeAt(int node) const { return document_.model.nodes[static_cast<size_t>(node)]; }
+
+  std::vector<int> rootsOfScene() {
+    const std::vector<tinygltf::Scene>& scenes = document_.model.scenes;
+    if (options_.scene && (*options_.scene < 0 || static_cast<size_t>(*options_.scene) >= scenes.size())) {
       throw SceneError(ExitCode::BadInput, document_.path, "/scenes",
                        "scene " + std::to_string(*options_.scene) + " was asked for, but the file has " +
-                           counted(count, "scene", "scenes"));
+                           counted(scenes.size(), "scene", "scenes"));
     }
-    if (options_.scene) return document_.scenes[static_cast<size_t>(*options_.scene)].nodes;
-    if (document_.defaultScene != kNone) return document_.scenes[document_.defaultScene].nodes;
-    if (count > 0) return document_.scenes[0].nodes;
+    const int chosen = options_.scene ? *options_.scene : std::max(document_.model.defaultScene, 0);
+    document_.usage.mark("scenes", chosen);
+    if (!scenes.empty()) return scenes[static_cast<size_t>(chosen)].nodes;
     document_.report.warn("", "the file has no scene; all its nodes are shown");
-    std::vector<uint32_t> roots;
-    for (uint32_t i = 0; i < document_.nodes.size(); ++i) {
-      if (document_.nodes[i].parent == kNone) roots.push_back(i);
+    std::vector<int> roots;
+    for (size_t i = 0; i < document_.parents.size(); ++i) {
+      if (document_.parents[i] < 0) roots.push_back(static_cast<int>(i));
     }
     return roots;
   }
 
   // Depth first in the order of the file.
-  std::vector<uint32_t> nodesOfScene() {
-    std::vector<uint32_t> order, stack = rootsOfScene();
+  std::vector<int> nodesOfScene() {
+    std::vector<int> order, stack = rootsOfScene();
     std::reverse(stack.begin(), stack.end());
-    std::vector<bool> seen(document_.nodes.size(), false);
+    std::vector<bool> seen(document_.model.nodes.size(), false);
     while (!stack.empty()) {
-      const uint32_t node = stack.back();
+      const int node = stack.back();
       stack.pop_back();
-      if (seen[node]) continue;
-      seen[node] = true;
+      if (node < 0 || seen[static_cast<size_t>(node)]) continue;
+      seen[static_cast<size_t>(node)] = true;
+      document_.usage.mark("nodes", node);
       order.push_back(node);
-      const std::vector<uint32_t>& children = document_.nodes[node].children;
+      const std::vector<int>& children = nodeAt(node).children;
       stack.insert(stack.end(), children.rbegin(), children.rend());
     }
     return order;
   }
 
-  void addCamera(uint32_t index) {
-    const Node& node = document_.nodes[index];
-    if (node.camera == kNone) return;
-    CameraData camera = document_.cameras[node.camera];
+  void addCamera(int index) {
+    const tinygltf::Node& node = nodeAt(index);
+    if (node.camera < 0) return;
+    CameraData camera = document_.cameras[static_cast<size_t>(node.camera)];
     if (!node.name.empty()) camera.name = node.name;
     if (camera.name.empty()) camera.name = "camera " + std::to_string(scene_.cameras.size());
     // Scale does not apply to cameras: only where the node stands, its backward axis and which way is up.
-    const glm::dmat4& world = pose_.world[index];
+    const glm::dmat4& world = pose_.world[static_cast<size_t>(index)];
     const glm::dmat3 axes = axesOf(world);
     const glm::dvec3 back = axes[2], up = axes[1];
     const glm::dvec3 side = glm::cross(up, back);
@@ -127,14 +130,26 @@ class SceneBuilder {
     const glm::dvec3 z = glm::normalize(back), x = glm::normalize(side);
     cameras_.emplace_back(glm::dvec4(x, 0), glm::dvec4(glm::cross(z, x), 0), glm::dvec4(z, 0), world[3]);
     scene_.cameras.push_back(std::move(camera));
+    cameraOf_.push_back(node.camera);
   }
 
-  void addLight(uint32_t index) {
-    const Node& node = document_.nodes[index];
-    if (node.light == kNone) return;
-    PunctualLight light = document_.lights[node.light];
+  // Flaws matter only in the camera that looks.
+  void useCamera() {
+    for (size_t i = 0; i < cameraOf_.size(); ++i) {
+      const std::string& wanted = options_.camera;
+      if (wanted.empty() ? i == 0 : scene_.cameras[i].name == wanted || std::to_string(i) == wanted)
+        document_.usage.mark("cameras", cameraOf_[i]);
+    }
+  }
+
+  void addLight(int index) {
+    const tinygltf::Node& node = nodeAt(index);
+    const int source = gltf::index(member(node.extensions, "KHR_lights_punctual"), "light");
+    if (source < 0) return;
+    document_.usage.mark("lights", source);
+    PunctualLight light = document_.lights[static_cast<size_t>(source)];
     if (!node.name.empty()) light.name = node.name;
-    const glm::dmat4& world = pose_.world[index];
+    const glm::dmat4& world = pose_.world[static_cast<size_t>(index)];
     const bool isPoint = light.kind == PunctualKind::Point;
     const glm::dvec3 direction = isPoint ? glm::dvec3(0, 0, -1) : -axesOf(world)[2];
     if (!(glm::length(direction) > 1e-30) || !isFiniteMatrix(Mat4(world))) {
@@ -146,16 +161,23 @@ class SceneBuilder {
     scene_.lights.push_back(std::move(light));
   }
 
-  void addMesh(uint32_t index) {
-    const Node& node = document_.nodes[index];
+  void addMesh(int index) {
+    const tinygltf::Node& node = nodeAt(index);
+    document_.usage.mark("meshes", node.mesh);
     std::vector<glm::dmat4> placed;
-    if (!firstMesh_) firstMesh_ = index;
-    if (node.skin != kNone) {
+    if (firstMesh_ < 0) firstMesh_ = index;
+    document_.usage.mark("skins", node.skin);
+    // Without joints the mesh stays where its node is.
+    const int skin =
+        node.skin >= 0 && !document_.model.skins[static_cast<size_t>(node.skin)].joints.empty() ? node.skin : -1;
+    if (skin >= 0) {
       placed.emplace_back(1);
     } else {
-      budget(2 * instanceCount(document_, node) * sizeof(glm::dmat4));
-      for (const glm::dmat4& local : instanceTransforms(document_, node)) {
-        const glm::dmat4 toWorld = pose_.world[index] * local;
+      const Attributes instancing = instancingOf(node);
+      for (const auto& [name, accessor] : instancing) document_.useAccessor(accessor);
+      budget(2 * instanceCount(document_, instancing) * sizeof(glm::dmat4));
+      for (const glm::dmat4& local : instanceTransforms(document_, instancing)) {
+        const glm::dmat4 toWorld = pose_.world[static_cast<size_t>(index)] * local;
         if (shapeOf(toWorld) != Shape::Gone && isFiniteMatrix(Mat4(toWorld))) {
           placed.emplace_back(toWorld);
         } else {
@@ -164,13 +186,17 @@ class SceneBuilder {
         }
       }
     }
-    const Mesh& mesh = document_.meshes[node.mesh];
+    const tinygltf::Mesh& mesh = document_.model.meshes[static_cast<size_t>(node.mesh)];
+    const std::string name = mesh.name.empty() ? "mesh " + std::to_string(node.mesh) : mesh.name;
     for (size_t p = 0; !placed.empty() && p < mesh.primitives.size(); ++p) {
-      const std::string suffix = mesh.primitives.size() > 1 ? "/" + std::to_string(p) : "";
-      const uint32_t job = jobFor(mesh.primitives[p], node, pose_.weights[index], mesh.name + suffix);
+      MeshJob job;
+      job.primitive = &mesh.primitives[p];
+      job.place = "/meshes/" + std::to_string(node.mesh) + "/primitives/" + std::to_string(p);
+      job.name = name + (mesh.primitives.size() > 1 ? "/" + std::to_string(p) : "");
+      const uint32_t number = placeJob(std::move(job), skin, pose_.weights[static_cast<size_t>(index)]);
       budget(placed.size() * sizeof(MeshInstance));
       for (const glm::dmat4& toWorld : placed) {
-        scene_.instances.push_back({job, Mat4(1)});
+        scene_.instances.push_back({number, Mat4(1)});
         transforms_.push_back(toWorld);
         // What is flattened cannot share its triangles.
         if (shapeOf(toWorld) == Shape::Flat) budget(estimatedBytes(document_, mesh.primitives[p]));
@@ -178,56 +204,77 @@ class SceneBuilder {
     }
   }
 
+  // Variant and material, in the order of the file.
+  static std::vector<std::pair<int, int>> variantsOf(const Primitive& primitive) {
+    std::vector<std::pair<int, int>> variants;
+    const Value& mappings = member(member(primitive.extensions, "KHR_materials_variants"), "mappings");
+    for (size_t i = 0; i < mappings.ArrayLen(); ++i) {
+      const Value& mapping = mappings.Get(static_cast<int>(i));
+      const Value& list = member(mapping, "variants");
+      if (gltf::index(mapping, "material") < 0) continue;  // reported with the JSON
+      for (size_t k = 0; k < list.ArrayLen(); ++k)
+        variants.emplace_back(list.Get(static_cast<int>(k)).GetNumberAsInt(), gltf::index(mapping, "material"));
+    }
+    return variants;
+  }
+
   const Primitive* representative(const Primitive& primitive) {
-    GeometryKey key{primitive.attributes,
-                    primitive.targets,
-                    primitive.indices,
-                    primitive.material,
-                    primitive.draco ? primitive.draco->view : kNone,
-                    primitive.mode,
-                    primitive.variantMaterials};
+    const int packed = gltf::index(member(primitive.extensions, "KHR_draco_mesh_compression"), "bufferView");
+    GeometryKey key{primitive.attributes, primitive.targets,    primitive.indices, primitive.material, packed,
+                    primitive.mode,       variantsOf(primitive)};
     return representatives_.emplace(std::move(key), &primitive).first->second;
   }
 
-  uint32_t jobFor(const Primitive& primitive, const Node& node, const std::vector<float>& weights, std::string name) {
+  uint32_t placeJob(MeshJob job, int skin, const std::vector<float>& weights) {
+    const Primitive& primitive = *job.primitive;
     const bool isMorphed = !primitive.targets.empty();
-    MeshKey key{representative(primitive), node.skin, isMorphed ? weights : std::vector<float>()};
+    MeshKey key{representative(primitive), skin, isMorphed ? weights : std::vector<float>()};
     const auto [entry, isNew] = jobIndex_.emplace(std::move(key), static_cast<uint32_t>(jobs_.size()));
     if (!isNew) return entry->second;
     budget(estimatedBytes(document_, primitive));
-    MeshJob job;
-    job.primitive = &primitive;
-    job.name = std::move(name);
+    useData(primitive);
     job.material = materials_.use(materialOf(primitive));
     job.uvs = materials_.uvs(job.material);
     job.needsTangents = scene_.materials[job.material].needsTangents();
     job.keepAllAttributes = options_.keepAllAttributes;
     job.weights = entry->first.weights;
-    if (node.skin != kNone) job.joints = jointsOf(node.skin);
+    if (skin >= 0) job.joints = jointsOf(skin);
     jobs_.push_back(std::move(job));
     return entry->second;
   }
 
-  uint32_t materialOf(const Primitive& primitive) const {
-    for (const auto& [variant, material] : primitive.variantMaterials) {
-      if (variant == variant_) return material;
+  void useData(const Primitive& primitive) {
+    for (const auto& [name, accessor] : primitive.attributes) document_.useAccessor(accessor);
+    for (const auto& target : primitive.targets) {
+      for (const auto& [name, accessor] : target) document_.useAccessor(accessor);
+    }
+    if (const auto found = document_.unreadable.find(&primitive); found != document_.unreadable.end()) {
+      for (const int accessor : found->second) document_.useAccessor(accessor);
+    }
+    document_.useAccessor(primitive.indices);
+    document_.useView(gltf::index(member(primitive.extensions, "KHR_draco_mesh_compression"), "bufferView"));
+  }
+
+  int materialOf(const Primitive& primitive) const {
+    for (const auto& [variant, material] : variantsOf(primitive)) {
+      if (variant == variant_ && variant_ >= 0) return material;
     }
     return primitive.material;
   }
 
-  std::shared_ptr<const std::vector<glm::dmat4>> jointsOf(uint32_t skin) {
-    if (!skins_[skin]) {
-      skins_[skin] =
-          std::make_shared<const std::vector<glm::dmat4>>(jointMatrices(document_, pose_, document_.skins[skin]));
-    }
-    return skins_[skin];
+  std::shared_ptr<const std::vector<glm::dmat4>> jointsOf(int skin) {
+    std::shared_ptr<const std::vector<glm::dmat4>>& joints = skins_[static_cast<size_t>(skin)];
+    const tinygltf::Skin& source = document_.model.skins[static_cast<size_t>(skin)];
+    if (!joints) joints = std::make_shared<const std::vector<glm::dmat4>>(jointMatrices(document_, pose_, source));
+    document_.useAccessor(source.inverseBindMatrices);
+    return joints;
   }
 
   // A few bytes of JSON can ask for the same data over and over; real files stay far below this.
   void budget(uint64_t bytes) {
     constexpr uint64_t kAlways = uint64_t(1) << 30, kTimesSource = 64;
     spent_ += bytes;
-    if (spent_ <= kAlways + kTimesSource * document_.sourceBytes()) return;
+    if (spent_ <= kAlways + kTimesSource * document_.sourceBytes) return;
     throw SceneError(ExitCode::BadInput, document_.path, "/nodes",
                      "the scene repeats its data until it takes more than " + std::to_string(kTimesSource) +
                          " times the size of the file; share meshes between nodes instead of repeating primitives");
@@ -260,9 +307,9 @@ class SceneBuilder {
   // Up to here everything stands in the file's coordinates, as doubles.
   void placeAll() {
     glm::dvec3 root(0);
-    if (firstMesh_) {
-      uint32_t node = *firstMesh_;
-      while (document_.nodes[node].parent != kNone) node = document_.nodes[node].parent;
+    if (firstMesh_ >= 0) {
+      auto node = static_cast<size_t>(firstMesh_);
+      while (document_.parents[node] >= 0) node = static_cast<size_t>(document_.parents[node]);
       root = glm::dvec3(pose_.world[node][3]);
     }
     scene_.origin = originFor(scene_, transforms_, root);
@@ -296,12 +343,13 @@ class SceneBuilder {
   MaterialTable& materials_;
   SceneData& scene_;
   Pose pose_;
-  uint32_t variant_ = kNone;
+  int variant_ = -1;
   uint64_t spent_ = 0;
-  std::optional<uint32_t> firstMesh_;             // the first node that shows one
+  int firstMesh_ = -1;                            // the first node that shows one
   std::vector<glm::dmat4> transforms_, cameras_;  // of scene_.instances and scene_.cameras
   std::vector<glm::dvec3> lights_;                // positions of scene_.lights
   std::vector<size_t> jobOf_;                     // of scene_.meshes
+  std::vector<int> cameraOf_;                     // of the file, behind those of the scene
   std::vector<std::shared_ptr<const std::vector<glm::dmat4>>> skins_;
   std::map<GeometryKey, const Primitive*> representatives_;
   std::map<MeshKey, uint32_t> jobIndex_;

@@ -45,6 +45,11 @@ std::vector<TangentSource> tangentSources(Material& m) {
   return sources;
 }
 
+Wrap wrapOf(int mode) {
+  if (mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE) return Wrap::Clamp;
+  return mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::Mirror : Wrap::Repeat;
+}
+
 // Factors of exactly zero switch whole lobes off; their textures need not be read.
 void dropUnreadTextures(Material& m) {
   if (isBlack(m.emission)) m.emissiveTexture = {};
@@ -61,7 +66,7 @@ struct DecodedImage {
   std::vector<uint8_t> file;  // of an external image
   Bytes encoded;
   std::shared_ptr<const Image> image;
-  std::string problem;
+  std::string problem, note;
 };
 
 // Small files can hold huge empty pictures: bounds what all of them together may take.
@@ -82,17 +87,17 @@ void decode(const Document& document, const ImageSource& source, PixelBudget& bu
     out.problem = "is one image too many: together they take too much memory; make them smaller";
     return;
   }
-  if (source.view != kNone) {
-    const BufferView& view = document.views[source.view];
-    if (!view.valid) return;
-    out.encoded = view.data;
+  if (source.view >= 0) {
+    out.encoded = document.views[static_cast<size_t>(source.view)].data;
+    if (out.encoded.empty()) return;  // reported with the view
   } else {
-    std::optional<std::vector<uint8_t>> data = readUri(document, source.uri, out.problem);
+    if (source.uri.empty()) return;  // reported with the image
+    std::optional<std::vector<uint8_t>> data = document.files.read(source.uri, out.problem, out.note);
     if (!data) return;
     out.file = std::move(*data);
     out.encoded = out.file;
   }
-  const bool named = source.view == kNone && !source.uri.starts_with("data:");
+  const bool named = source.view < 0 && !isDataUri(source.uri);
   try {
     out.image = decodeImage(out.encoded.data(), out.encoded.size(), named ? source.uri : source.name);
     budget.add(out.image->bytes.size() + out.image->floats.size() * sizeof(float));
@@ -103,41 +108,54 @@ void decode(const Document& document, const ImageSource& source, PixelBudget& bu
 
 }  // namespace
 
-MaterialTable::Uvs MaterialTable::assignUvSlots(Material& material, uint32_t fileMaterial) {
+MaterialTable::Uvs MaterialTable::assignUvSlots(Material& material, int fileMaterial) {
   std::set<uint32_t> sets;
   forEachTexture(material, [&](const TextureRef& ref, bool) {
     if (ref) sets.insert(ref.uvSet);
   });
   Uvs uvs;
   uvs.tangents = tangentSources(material);
-  if (sets.size() > 2) {
-    document_.report.warn("/materials/" + std::to_string(fileMaterial),
-                          "a material reads more than two uv sets; the first two are used");
+  if (sets.size() > kUvSlots) {
+    document_.report.warn(
+        "/materials/" + std::to_string(fileMaterial),
+        "a material reads more than " + std::to_string(kUvSlots) + " uv sets; the others read the first");
   }
-  if (sets.empty() || *sets.rbegin() <= 1) {
+  if (sets.empty() || *sets.rbegin() < kUvSlots) {
     for (const uint32_t set : sets) uvs.set[set] = set;
     return uvs;
   }
   size_t slot = 0;
   for (const uint32_t set : sets) {
-    if (slot < 2) uvs.set[slot++] = set;
+    if (slot < kUvSlots) uvs.set[slot++] = set;
   }
-  forEachTexture(material, [&](TextureRef& ref, bool) { ref.uvSet = ref.uvSet == uvs.set[1] ? 1 : 0; });
+  forEachTexture(material, [&](TextureRef& ref, bool) {
+    const auto found = std::find(uvs.set.begin(), uvs.set.end(), ref.uvSet);
+    ref.uvSet = static_cast<uint8_t>(found == uvs.set.end() ? 0 : found - uvs.set.begin());
+  });
   return uvs;
 }
 
-uint32_t MaterialTable::use(uint32_t fileMaterial) {
-  uint32_t& placed = placed_[fileMaterial == kNone ? placed_.size() - 1 : fileMaterial];
+uint32_t MaterialTable::use(int fileMaterial) {
+  uint32_t& placed = placed_[fileMaterial < 0 ? placed_.size() - 1 : static_cast<size_t>(fileMaterial)];
   if (placed != kNone) return placed;
   placed = static_cast<uint32_t>(scene_.materials.size());
   Material material;
-  if (fileMaterial == kNone) {
+  if (fileMaterial < 0) {
     material.name = "default";
   } else {
-    material = document_.materials[fileMaterial];
+    material = document_.materials[static_cast<size_t>(fileMaterial)];
+    document_.usage.mark("materials", fileMaterial);
   }
   material.doubleSided |= doubleSided_;
   dropUnreadTextures(material);
+  forEachTexture(material, [&](TextureRef& ref, bool) {
+    if (!ref) return;
+    const tinygltf::Texture& texture = document_.model.textures[static_cast<size_t>(ref.texture)];
+    document_.usage.mark("textures", ref.texture);
+    document_.usage.mark("samplers", texture.sampler);
+    // One in an unsupported format was warned about: the factor alone stays.
+    if (imageOf(texture) < 0) ref = {};
+  });
   uvs_.push_back(assignUvSlots(material, fileMaterial));
   forEachTexture(material, [&](TextureRef& ref, bool isColour) {
     if (!ref) return;
@@ -148,44 +166,72 @@ uint32_t MaterialTable::use(uint32_t fileMaterial) {
   return placed;
 }
 
-std::vector<uint32_t> MaterialTable::usedImages() const {
-  std::set<uint32_t> used;
-  for (const auto& [key, index] : textures_) used.insert(document_.textures[static_cast<size_t>(key.first)].image);
+std::vector<int> MaterialTable::usedImages() const {
+  std::set<int> used;
+  for (const auto& [key, number] : textures_) {
+    const tinygltf::Texture& texture = document_.model.textures[static_cast<size_t>(key.first)];
+    used.insert(imageOf(texture));
+  }
   return {used.begin(), used.end()};
 }
 
 void MaterialTable::loadTextures() {
-  const std::vector<uint32_t> used = usedImages();
   std::vector<DecodedImage> decoded(document_.images.size());
   // Two entries for one file or view share its pixels.
-  std::map<std::pair<std::string, uint32_t>, uint32_t> firstOf;
-  std::vector<uint32_t> unique;
-  for (const uint32_t image : used) {
-    const ImageSource& source = document_.images[image];
-    if (firstOf.emplace(std::make_pair(source.uri, source.view), image).second) unique.push_back(image);
+  std::map<std::pair<std::string_view, int>, int> firstOf;
+  std::vector<int> unique;
+  for (const int image : usedImages()) {
+    const ImageSource& source = document_.images[static_cast<size_t>(image)];
+    document_.usage.mark("images", image);
+    document_.useView(source.view);
+    if (firstOf.emplace(std::pair<std::string_view, int>(source.uri, source.view), image).second)
+      unique.push_back(image);
   }
-  PixelBudget budget(document_.sourceBytes());
-  parallelFor(unique.size(),
-              [&](size_t i) { decode(document_, document_.images[unique[i]], budget, decoded[unique[i]]); });
-  for (const uint32_t image : unique) {
-    DecodedImage& item = decoded[image];
-    if (!item.problem.empty()) document_.report.problem("/images/" + std::to_string(image), item.problem);
+  PixelBudget budget(document_.sourceBytes);
+  parallelFor(unique.size(), [&](size_t i) {
+    const auto image = static_cast<size_t>(unique[i]);
+    decode(document_, document_.images[image], budget, decoded[image]);
+  });
+  for (const int image : unique) {
+    DecodedImage& item = decoded[static_cast<size_t>(image)];
+    const std::string place = "/images/" + std::to_string(image);
+    if (!item.problem.empty()) document_.report.problem(place, item.problem, "factors alone are used");
+    if (!item.note.empty()) document_.report.problem(place, item.note, "that file is read");
     if (item.image && item.image->limited > 0)
-      document_.report.warn(
-          "/images/" + std::to_string(image),
-          std::to_string(item.image->limited) + " values are not finite, negative or above 1e18; they are limited");
-    if (item.image && document_.images[image].view == kNone)
+      document_.report.warn(place, std::to_string(item.image->limited) +
+                                       " values are not finite, negative or above 1e18; they are limited");
+    if (item.image && document_.images[static_cast<size_t>(image)].view < 0)
       document_.hash.add(item.encoded.data(), item.encoded.size());
     item.file = {};
   }
   scene_.textures.resize(textures_.size());
-  for (const auto& [key, index] : textures_) {
-    const TextureSource& source = document_.textures[static_cast<size_t>(key.first)];
-    const ImageSource& image = document_.images[source.image];
-    const std::shared_ptr<const Image>& pixels = decoded[firstOf.at({image.uri, image.view})].image;
+  for (const auto& [key, number] : textures_) {
+    const tinygltf::Texture& texture = document_.model.textures[static_cast<size_t>(key.first)];
+    const ImageSource& image = document_.images[static_cast<size_t>(imageOf(texture))];
+    const std::shared_ptr<const Image>& pixels =
+        decoded[static_cast<size_t>(firstOf.at({image.uri, image.view}))].image;
     if (!pixels) continue;
-    scene_.textures[static_cast<size_t>(index)] =
-        Texture(pixels, key.second, source.wrapU, source.wrapV, source.filter);
+    const tinygltf::Sampler sampler =
+        texture.sampler < 0 ? tinygltf::Sampler() : document_.model.samplers[static_cast<size_t>(texture.sampler)];
+    scene_.textures[static_cast<size_t>(number)] =
+        Texture(pixels, key.second, wrapOf(sampler.wrapS), wrapOf(sampler.wrapT),
+                sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST ? Filter::Nearest : Filter::Linear);
+  }
+  dropMissingTextures();
+}
+
+// A texture that cannot be had leaves its factor alone.
+void MaterialTable::dropMissingTextures() {
+  std::vector<int32_t> placed(scene_.textures.size(), -1);
+  int32_t kept = 0;
+  for (size_t i = 0; i < placed.size(); ++i) {
+    if (scene_.textures[i].sharedImage()) placed[i] = kept++;
+  }
+  std::erase_if(scene_.textures, [](const Texture& texture) { return !texture.sharedImage(); });
+  for (Material& material : scene_.materials) {
+    forEachTexture(material, [&](TextureRef& ref, bool) {
+      if (ref) ref.texture = placed[static_cast<size_t>(ref.texture)];
+    });
   }
 }
 

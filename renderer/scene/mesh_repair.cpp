@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace braid::gltf {
 
@@ -40,7 +41,7 @@ bool dropBadTriangles(TriangleMesh& mesh, Report& report, const std::string& pla
 }
 
 void compactVertices(TriangleMesh& mesh, ExtraAttributes& extras) {
-  constexpr uint32_t kUnused = kNone;
+  constexpr uint32_t kUnused = std::numeric_limits<uint32_t>::max();
   std::vector<uint32_t> target(mesh.positions.size(), kUnused);
   for (const glm::uvec3& t : mesh.triangles) target[t.x] = target[t.y] = target[t.z] = 0;
   uint32_t used = 0;

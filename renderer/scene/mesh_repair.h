@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "renderer/scene/gltf_json.h"
+#include "renderer/scene/gltf_report.h"
 #include "renderer/scene/scene_data.h"
 
 namespace braid::gltf {
@@ -46,8 +46,7 @@ void forEachAttribute(TriangleMesh& mesh, ExtraAttributes& extras, const Visit& 
   present(mesh.positions);
   present(mesh.normals);
   present(mesh.tangents);
-  present(mesh.uv[0]);
-  present(mesh.uv[1]);
+  for (auto& uv : mesh.uv) present(uv);
   present(mesh.colors);
   for (std::vector<Vec2>& uv : extras.uv) present(uv);
 }

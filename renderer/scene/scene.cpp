@@ -252,7 +252,9 @@ size_t Scene::geometryBytes() const {
     bytes += m.positions.capacity() * sizeof(Vec3) + m.triangles.capacity() * sizeof(glm::uvec3) +
              m.normals.capacity() * sizeof(Vec3) +
              (m.tangents.capacity() + m.otherTangents[0].capacity() + m.otherTangents[1].capacity()) * sizeof(Vec4) +
-             (m.uv[0].capacity() + m.uv[1].capacity()) * sizeof(Vec2) + m.colors.capacity() * sizeof(Vec4);
+             m.colors.capacity() * sizeof(Vec4);
+  for (const TriangleMesh& m : data_.meshes)
+    for (const std::vector<Vec2>& uv : m.uv) bytes += uv.capacity() * sizeof(Vec2);
   return bytes;
 }
 

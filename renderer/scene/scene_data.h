@@ -13,6 +13,9 @@
 
 namespace braid {
 
+// Sets of texture coordinates that one mesh can have.
+inline constexpr uint32_t kUvSlots = 4;
+
 // One glTF primitive as an indexed triangle list. Embree reads positions and triangles in place, so both are allocated
 // with room for one more element (Embree loads 16 bytes a vertex): call padForEmbree() after filling them.
 struct TriangleMesh {
@@ -23,9 +26,9 @@ struct TriangleMesh {
   std::vector<Vec4> tangents;  // empty unless the material needs them; w = ±1 is the sign of the bitangent
   // Frames 1 and 2 of materials whose textures lie differently (Material::coatFrame); empty: the frame is `tangents`.
   std::vector<Vec4> otherTangents[2];
-  std::vector<Vec2> uv[2];   // empty unless a texture reads them
-  std::vector<Vec4> colors;  // empty, or linear RGBA in [0,1] multiplying the base colour
-  uint32_t material = 0;     // index into SceneData::materials, always valid
+  std::vector<Vec2> uv[kUvSlots];  // empty unless a texture reads them
+  std::vector<Vec4> colors;        // empty, or linear RGBA in [0,1] multiplying the base colour
+  uint32_t material = 0;           // index into SceneData::materials, always valid
 
   void padForEmbree() {
     positions.reserve(positions.size() + 1);
@@ -95,6 +98,7 @@ struct SceneData {
   std::vector<std::string> sceneNames;
   std::vector<AnimationClip> animations;
   std::vector<std::string> warnings;  // one line each, already counted
+  std::vector<std::string> notes;     // flaws of what the picture does not use
   uint64_t contentHash = 0;           // over every referenced byte
   bool defaultCamera = false;         // the file had none: framed from the bounds
   bool defaultLight = false;          // the file had none: a grey dome

@@ -102,8 +102,7 @@ uint32_t duplicate(TriangleMesh& mesh, std::vector<std::vector<Vec2>>& uvs, uint
   append(mesh.tangents);
   append(mesh.otherTangents[0]);
   append(mesh.otherTangents[1]);
-  append(mesh.uv[0]);
-  append(mesh.uv[1]);
+  for (std::vector<Vec2>& uv : mesh.uv) append(uv);
   append(mesh.colors);
   for (std::vector<Vec2>& uv : uvs) append(uv);
   return copy;

@@ -181,6 +181,38 @@ def compressed(extension, payload):
     return json.dumps(document).encode() + b"\0" + payload
 
 
+def flawed():
+    """The scene of every feature, with one flaw that costs only a part."""
+    body, binary = every_feature().split(b"\0", 1)
+    flaws = {
+        "texture": lambda d: d["images"].__setitem__(0, {"uri": "leaf.png"}),
+        "null": lambda d: d["materials"][0].update(normalTexture=None),
+        "huge": lambda d: d["nodes"][1].update(translation=[1e300, 0, 3]),
+        "index": lambda d: d["meshes"][0]["primitives"][0].update(indices=6),
+        "accessor": lambda d: d["accessors"][2].update(count=900),
+        "sparse": lambda d: d["accessors"][8]["sparse"].update(count=2),
+        "joints": lambda d: d["accessors"][4].update(
+            componentType=5125, count=1),
+        "skin": lambda d: d["skins"][0].update(joints=[99, 2]),
+        "channel": lambda d: d["animations"][0]["channels"].append(
+            {"sampler": 3, "target": {"path": "scale"}}),
+        "cycle": lambda d: d["nodes"][2].update(children=[0]),
+        "camera": lambda d: d["cameras"][0].pop("perspective"),
+        "lights": lambda d: d["extensions"]["KHR_lights_punctual"][
+            "lights"][0].update(range=0, spot=None),
+        "extension": lambda d: d.update(extensionsRequired=["ACME_gizmo"]),
+        "view": lambda d: d["bufferViews"][0].update(byteLength=9000),
+        "sets": lambda d: d["materials"][0]["emissiveTexture"].update(
+            texCoord=7)}
+    for name, change in flaws.items():
+        document = json.loads(body)
+        change(document)
+        yield "flaw, " + name, json.dumps(document).encode() + b"\0" + binary
+    yield "flaw, cut", body + b"\0" + binary[:150]
+    yield "flaw, text", body.replace(b'"red"', b'"r\xe9\td\\q"').replace(
+        b"0.4,", b"NaN,").replace(b"0.5,", b"-1e999,") + b"\0" + binary
+
+
 def gltf_seeds():
     for case in CASES.values():
         if re.match("1e[67] |texture .*x16384|lights|scale", case.name):
@@ -193,6 +225,7 @@ def gltf_seeds():
                               b"DRACO\x02\x02\x01\x01\0\0" + bytes(40))
     yield "meshopt", compressed("EXT_meshopt_compression",
                                 b"\xa0" + bytes(60))
+    yield from flawed()
     yield "container", b"glTF" + struct.pack("<IIII", 2, 40, 20, 0x4E4F534A) \
         + b'{"asset":{"version":"2.0"}}'
 
