@@ -32,7 +32,7 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kPatch{"auto-patch", 15, "Width in pixels of the patches that errors are summed over"};
+const OptionInfo kPatch{"auto-patch", 15, "Width in pixels of the patches that errors are summed over", 1, 101};
 const OptionInfo kFuse{"auto-fuse", 1, "0: photon maps are bases, not part of the image that is denoised"};
 const OptionInfo kDebias{"auto-debias", 1, "0: photon maps keep the bias that they tell"};
 const OptionInfo kShrink{"auto-shrink", 1, "0: bases only, without James-Stein shrinkage towards them"};

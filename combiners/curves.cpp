@@ -48,17 +48,21 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kStep{"curves-step", 0.1, "Perturbation of the risk estimate in standard deviations of a pixel"};
-const OptionInfo kSlope{"curves-fallback-slope", -1, "Slope of pixels without a curve; -2: the paper, -1: theory"};
-const OptionInfo kSlopePrior{"curves-slope-prior", 8,
-                             "Weight of the slope -1 beside the points of a curve; 0: the paper"};
-const OptionInfo kPoints{"curves-points", 4, "Most points of a curve, 2 to 8; fewer: all pixels take the fallback"};
-const OptionInfo kMost{"curves-most", 65536, "Most passes that a denoised pixel counts"};
+const OptionInfo kStep{"curves-step", 0.1, "Perturbation of the risk estimate in standard deviations of a pixel",
+                       0.001,         10,  false};
+const OptionInfo kSlope{
+    "curves-fallback-slope", -1, "Slope of pixels without a curve; -2: the paper, -1: theory", -2, -0.25, false};
+const OptionInfo kSlopePrior{
+    "curves-slope-prior", 8, "Weight of the slope -1 beside the points of a curve; 0: the paper", 0, 1e6, false};
+const OptionInfo kPoints{"curves-points", 4, "Most points of a curve, 2 to 8; fewer: all pixels take the fallback", 0,
+                         8};
+const OptionInfo kMost{"curves-most", 65536, "Most passes that a denoised pixel counts", 0, 1e15};
 const OptionInfo kGate{"curves-gate", 1, "1: lone outliers of the noisy image do not count; 0: the paper"};
 const OptionInfo kRelative{"curves-relative", 1, "1: pixels of a map count by their relative error; 0: the paper"};
 const OptionInfo kPool{"curves-pool", 1, "1: risks hidden by noise are those of wider windows; 0: the paper"};
 const OptionInfo kCovariance{"curves-covariance", 1, "1: noise that both images share counts; 0: the paper"};
-const OptionInfo kMostRatio{"curves-most-ratio", 64, "Most passes that it counts, per pass of the noisy image"};
+const OptionInfo kMostRatio{
+    "curves-most-ratio", 64, "Most passes that it counts, per pass of the noisy image", 0, 1e9, false};
 
 // Before, variances are too uncertain for a curve.
 constexpr double kFewestPasses = 16;

@@ -14,7 +14,7 @@ namespace braid {
 
 // For all that have no stop of their own.
 inline const OptionInfo kCurvesStop{
-    "curves-stop", 0, "Passes after which nothing is denoised anew, rounded up to 2, 4, 8, ...; 0: never"};
+    "curves-stop", 0, "Passes after which nothing is denoised anew, rounded up to 2, 4, 8, ...; 0: never", 0, 1e12};
 
 class StoppingMethod : public Method {
  public:

@@ -49,9 +49,9 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kPrior{"double-shrinkage-prior", 0, "0: radiance prior, 1: James-Stein's Y*, 2: none"};
-const OptionInfo kStage{"double-shrinkage-stage", 2, "1: inverse squared errors only, 2: then towards the prior"};
-const OptionInfo kStride{"double-shrinkage-stride", 4, "Distance of the regression models in pixels"};
+const OptionInfo kPrior{"double-shrinkage-prior", 0, "0: radiance prior, 1: James-Stein's Y*, 2: none", 0, 2};
+const OptionInfo kStage{"double-shrinkage-stage", 2, "1: inverse squared errors only, 2: then towards the prior", 1, 2};
+const OptionInfo kStride{"double-shrinkage-stride", 4, "Distance of the regression models in pixels", 1, 64};
 
 const OptionInfo kOwnHalves{"double-shrinkage-own-halves", 1,
                             "1: fit the priors of the halves by their own samples alone; 0: weights from all samples"};

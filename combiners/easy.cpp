@@ -13,7 +13,8 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kStep{"easy-step", 0.1, "Perturbation of the risk estimate in standard deviations of a pixel"};
+const OptionInfo kStep{"easy-step", 0.1, "Perturbation of the risk estimate in standard deviations of a pixel",
+                       0.001,       10,  false};
 
 class Easy : public Method {
  public:

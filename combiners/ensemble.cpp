@@ -15,8 +15,8 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kPatch{"ensemble-patch", 7,
-                        "Width in pixels of the patches that errors are summed over; 1: the paper"};
+const OptionInfo kPatch{"ensemble-patch", 7, "Width in pixels of the patches that errors are summed over; 1: the paper",
+                        1, 101};
 const OptionInfo kFilter{"ensemble-filter", 1, "1: smooth the weights by a cross bilateral filter; 0: do not"};
 const OptionInfo kShared{"ensemble-shared", 0, "1: the same weights for all channels; 0: weights per channel"};
 const OptionInfo kNonNegative{"ensemble-non-negative", 1, "0: weights may be negative, which makes fireflies"};
@@ -26,8 +26,12 @@ const OptionInfo kRelative{
     "ensemble-relative", 1,
     "1: errors relative to the brightness of the unbiased image, as relL2 counts them; 0: the paper's"};
 
-const OptionInfo kPrior{"ensemble-prior", 6,
-                        "Pull of noise towards equal weights: 6 for weights that may be anything; 0: the paper's"};
+const OptionInfo kPrior{"ensemble-prior",
+                        6,
+                        "Pull of noise towards equal weights: 6 for weights that may be anything; 0: the paper's",
+                        0,
+                        1e6,
+                        false};
 
 constexpr double kImprovement = 1e-4;  // a hundredth of it changes errors by 1e-5 and takes 1.15x as long
 

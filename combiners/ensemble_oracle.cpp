@@ -15,7 +15,8 @@ namespace {
 
 const OptionInfo kHalves{"ensemble-oracle-halves", 0,
                          "1: by the errors of the halves (M^half of the paper); 0: by those of the whole images"};
-const OptionInfo kPatch{"ensemble-oracle-patch", 7, "Width in pixels of the patches that errors are summed over"};
+const OptionInfo kPatch{"ensemble-oracle-patch", 7, "Width in pixels of the patches that errors are summed over", 1,
+                        101};
 const OptionInfo kNonNegative{"ensemble-oracle-non-negative", 1, "0: weights may be negative"};
 const OptionInfo kFilter{"ensemble-oracle-filter", 1, "1: smooth the weights as the ensemble does; 0: do not"};
 

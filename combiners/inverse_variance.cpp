@@ -15,7 +15,8 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kRadius{"inverse-variance-radius", 7, "Radius in pixels of the box that errors are averaged over"};
+const OptionInfo kRadius{"inverse-variance-radius", 7, "Radius in pixels of the box that errors are averaged over", 0,
+                         1000};
 
 struct Errors {
   Plane<double> unbiased, biased;  // v and m before the box

@@ -42,16 +42,18 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kConstant{"js-constant", 1,
-                           "Shrinkage relative to the papers' p - 2; below 2, it beats the unbiased image"};
+const OptionInfo kConstant{
+    "js-constant", 1, "Shrinkage relative to the papers' p - 2; below 2, it beats the unbiased image", 0, 100, false};
 const OptionInfo kRegression{
-    "js-regression", 2, "Fit the biased image to the unbiased one first: 0 no, 1 yes (the paper), 2 where it helps"};
-const OptionInfo kVariance{"js-variance", 0, "Variance of a block: 0 box, 1 Gaussian, 2 robust, 3 whitened"};
-const OptionInfo kSigma{"js-sigma", 3, "Standard deviation of the Gaussian filter of the variance in pixels"};
+    "js-regression", 2, "Fit the biased image to the unbiased one first: 0 no, 1 yes (the paper), 2 where it helps", 0,
+    2};
+const OptionInfo kVariance{"js-variance", 0, "Variance of a block: 0 box, 1 Gaussian, 2 robust, 3 whitened", 0, 3};
+const OptionInfo kSigma{"js-sigma", 3,  "Standard deviation of the Gaussian filter of the variance in pixels",
+                        0.1,        50, false};
 const OptionInfo kCrossed{"js-crossed", 0, "1: combine each half with the fit of the other one, then average"};
 const OptionInfo kGlobal{"js-global", 0, "1: one factor for the whole image"};
 const OptionInfo kPositivePart{"js-positive-part", 1, "0: let factors be negative"};
-const OptionInfo kStride{"js-stride", 4, "Distance of the regression models in pixels"};
+const OptionInfo kStride{"js-stride", 4, "Distance of the regression models in pixels", 1, 64};
 const OptionInfo kGate{
     "js-gate", 1, "1: replace lone outliers of the unbiased image first, as far as its halves do not agree on them"};
 const OptionInfo kMeasured{"js-measured", 1,

@@ -29,10 +29,15 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kGamma{"uncorrelated-gamma", -1, "Sensitivity of the weights to noise; negative: chosen by variance"};
+const OptionInfo kGamma{
+    "uncorrelated-gamma", -1, "Sensitivity of the weights to noise; negative: chosen by variance", -1, 1e9, false};
 
-const OptionInfo kMostNoise{"uncorrelated-most-noise", 224,
-                            "Most variance of one pixel of a pair, in units of the other's; 0: any (paper)"};
+const OptionInfo kMostNoise{"uncorrelated-most-noise",
+                            224,
+                            "Most variance of one pixel of a pair, in units of the other's; 0: any (paper)",
+                            0,
+                            1e30,
+                            false};
 
 const OptionInfo kMeasured{
     "uncorrelated-measured", 1,

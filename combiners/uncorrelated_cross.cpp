@@ -9,8 +9,12 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kGamma{"uncorrelated-cross-gamma", -1,
-                        "Sensitivity of the weights to noise; negative: chosen by variance"};
+const OptionInfo kGamma{"uncorrelated-cross-gamma",
+                        -1,
+                        "Sensitivity of the weights to noise; negative: chosen by variance",
+                        -1,
+                        1e9,
+                        false};
 
 class UncorrelatedCross : public Method {
  public:

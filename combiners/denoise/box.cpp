@@ -8,7 +8,7 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kRadius{"box-radius", 7, "Radius of the box filter in pixels"};
+const OptionInfo kRadius{"box-radius", 7, "Radius of the box filter in pixels", 0, 1000};
 
 Rgb<float> boxFiltered(const Rgb<float>& in, int radius) {
   Rgb<float> out(in.width(), in.height());

@@ -16,10 +16,10 @@ namespace {
 const OptionInfo kDemodulate{"nfor-demodulate", 1, "1: regress colours divided by albedos; 0: colours (paper)"};
 const OptionInfo kOffsets{"nfor-offsets", 1, "1: pixel offsets are features too; 0: the paper"};
 const OptionInfo kVariance{"nfor-variance", 0,
-                           "Variance behind the weights: 0 of the samples, 1 shrunk to a box mean, 2 filtered"};
+                           "Variance behind the weights: 0 of the samples, 1 shrunk to a box mean, 2 filtered", 0, 2};
 const OptionInfo kDespike{"nfor-despike", 1,
                           "1: take out outliers that one half or two quarters alone speak for; 0: the paper"};
-const OptionInfo kStride{"nfor-stride", 2, "Distance of the regression models in pixels; 1: the paper"};
+const OptionInfo kStride{"nfor-stride", 2, "Distance of the regression models in pixels; 1: the paper", 1, 9};
 
 NforOptions optionsOf(const MethodInputs& in) {
   NforOptions options;

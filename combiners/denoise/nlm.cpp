@@ -14,9 +14,9 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kSensitivity{"nlm-k", 0.45, "Sensitivity: larger filters more"};
-const OptionInfo kWindow{"nlm-window", 10, "Radius of the window in pixels"};
-const OptionInfo kPatch{"nlm-patch", 3, "Radius of the patches in pixels"};
+const OptionInfo kSensitivity{"nlm-k", 0.45, "Sensitivity: larger filters more", 0.01, 100, false};
+const OptionInfo kWindow{"nlm-window", 10, "Radius of the window in pixels", 0, 100};
+const OptionInfo kPatch{"nlm-patch", 3, "Radius of the patches in pixels", 0, 20};
 
 Rgb<float> finiteCopy(const Rgb<float>& in) {
   Rgb<float> out = in;

@@ -13,7 +13,8 @@ namespace {
 const OptionInfo kDemodulate{"rdfc-demodulate", 0, "1: filter the colour divided by the albedo; 0: the paper"};
 const OptionInfo kVariance{"rdfc-variance", 0,
                            "Variance of the colour: 0 of the samples (paper, independent samples), 1 rescaled by the "
-                           "halves (paper, low-discrepancy samples), 2 shrunk towards its neighbourhood"};
+                           "halves (paper, low-discrepancy samples), 2 shrunk towards its neighbourhood",
+                           0, 2};
 
 const OptionInfo kDespike{"rdfc-despike", 1,
                           "1: take out outliers that one half or two quarters alone speak for; 0: the paper"};

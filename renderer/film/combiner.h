@@ -16,11 +16,14 @@
 
 namespace braid {
 
-// A number that a user may set, e.g. --js-constant 1.25 on the command line; names are "<method>-<word>".
+// A number that a user may set, e.g. --js-constant 1.25 on the command line; names are "<method>-<word>". It is within
+// [least, most], a whole one or any; unless said otherwise, a switch.
 struct OptionInfo {
   std::string name;
   double fallback = 0;
   std::string description;
+  double least = 0, most = 1;
+  bool whole = true;
 };
 
 class MethodOptions {
