@@ -44,8 +44,10 @@ class ChannelList {
   void add(const std::string& name, const Plane<float>& plane) {
     if (plane.empty()) return;
     check(plane);
-    list_.push_back({prefix_ + name, &plane});
+    list_.push_back({prefix_ + name, &plane, half_});
   }
+  // Whether what is added from now on has half floats.
+  void setHalf(bool half) { half_ = half; }
   void add(const std::string& layer, const Names& names, const Rgb<float>& planes) {
     for (size_t c = 0; c < 3; ++c) add(layer + "." + names[c], planes[c]);
   }
@@ -58,6 +60,7 @@ class ChannelList {
 
   int width_, height_;
   std::string prefix_;
+  bool half_ = false;
   std::vector<ExrChannel> list_;
 };
 
@@ -101,11 +104,16 @@ std::vector<ExrChannel> namedPlanes(const Estimates& estimates, const Rgb<float>
   const bool all = options.aovs == AovSet::All;
   if (options.aovs != AovSet::None && estimates.features) {
     const Features& f = *estimates.features;
+    channels.setHalf(!all && half);
     addFeature(channels, "Albedo", kColour, f.albedo, all);
     addFeature(channels, "N", kVector, f.normal, all);
-    addFeature(channels, "Depth", "Z", f.depth, all);
     addFeature(channels, "Visibility", "V", f.visibility, all);
+    channels.setHalf(false);  // metres may be any
+    addFeature(channels, "Depth", "Z", f.depth, all);
   }
+  if (options.aovs == AovSet::Features)
+    for (const ExrLayer& layer : options.layers)
+      if (layer.name == "Error" && layer.plane) channels.add(layer.name, "Y", *layer.plane);
   if (!all) return channels.list();
   for (const Estimate& e : estimates.estimates) {
     addEstimate(channels, e, options);

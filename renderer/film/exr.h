@@ -12,6 +12,7 @@
 
 namespace braid {
 
+// Layers beside the image. Features: their means, as half floats but for the depth, and the image's error.
 enum class AovSet { None, Features, All };
 
 // One more layer to write beside the estimates: colours, such as "combined.js", or a single plane as channel Y, such as
@@ -28,9 +29,9 @@ struct ExrOptions {
   bool lightParts = false;       // also <estimate>.direct, directA, directB, directVariance, indirectVariance
   bool history = false;          // also <estimate>.variance1, variance2, variance4, …: after so many passes,
                                  // and mean1, halfA1, halfB1, … where they are kept
-  bool floatHeadline = false;    // R G B as float instead of half
+  bool floatHeadline = false;    // R G B as float instead of half; with AovSet::Features those as well
   std::string layerPrefix;       // e.g. "ViewLayer": put before every channel but R G B A
-  std::vector<ExrLayer> layers;  // written with AovSet::All
+  std::vector<ExrLayer> layers;  // written with AovSet::All; "Error" with Features too
 };
 
 // A plane under the channel name that it has in files, such as "R", "Albedo.R" or "pt.mean.R".
@@ -73,7 +74,7 @@ ImageFile readImage(const std::string& path);
 // Whether the file holds the layer, in one of the forms that rgb() takes.
 bool hasLayer(const ImageFile& file, const std::string& prefix);
 
-// Tone-mapped 8-bit PNG: exposure in stops, then sRGB with values clamped to [0,1].
+// Tone-mapped 8-bit PNG: writePicture() without alpha.
 void writePng(const std::string& path, const Rgb<float>& image, float exposureStops = 0);
 
 }  // namespace braid

@@ -124,13 +124,25 @@ void linearise(const OIIO::ImageSpec& spec, bool multiplied, std::vector<Plane<f
   }
 }
 
+// Linear colours that alpha is not in yet.
+void premultiply(const OIIO::ImageSpec& spec, std::vector<Plane<float>>& planes) {
+  if (spec.alpha_channel < 0 || spec.alpha_channel >= spec.nchannels) return;
+  const Plane<float>& alpha = planes[static_cast<size_t>(spec.alpha_channel)];
+  for (Plane<float>& p : planes)
+    if (&p != &alpha)
+      for (size_t i = 0; i < p.size(); ++i) p[i] *= alpha[i];
+}
+
 void addPart(ImageFile& file, OIIO::ImageInput& in, int part) {
   const OIIO::ImageSpec spec = in.spec(part);
   if (part > 0 && (spec.width != file.width || spec.height != file.height)) return;  // a thumbnail or a mip level
   std::vector<Plane<float>> planes(static_cast<size_t>(spec.nchannels), Plane<float>(spec.width, spec.height));
   readPart(file.path, in, part, planes);
   // OpenImageIO's WebP reader multiplies whatever it is asked for.
-  if (holdsSrgb(spec)) linearise(spec, std::string_view(in.format_name()) == "webp", planes);
+  if (holdsSrgb(spec))
+    linearise(spec, std::string_view(in.format_name()) == "webp", planes);
+  else if (spec.get_int_attribute("oiio:UnassociatedAlpha") != 0)
+    premultiply(spec, planes);
   const std::string partName = spec.get_string_attribute("oiio:subimagename", "part" + std::to_string(part));
   for (int c = 0; c < spec.nchannels; ++c) {
     std::string name = spec.channel_name(c);

@@ -9,9 +9,21 @@
 
 namespace braid {
 
-// Writes to "path.tmp-PID.EXT" in the same folder; finish() waits for the disk and renames it to `path`. Without
-// finish() the temporary file is removed and a previous file stays intact. OpenImageIO's writers do not check every
-// write, so the first failure is remembered here and reported by finish(), a full disk included.
+// "-" is standard output.
+inline constexpr const char* kStandardOutput = "-";
+
+// Standard output, an open descriptor (/dev/stdout, /dev/fd/3), a device, a FIFO or a socket: what is written there
+// goes through, once, and nothing can take its place.
+bool isStream(const std::string& path);
+
+// Where a file of this name comes to lie: the target of a symbolic link, also one that does not exist yet. Without
+// links the path itself.
+std::string behindLinks(const std::string& path);
+
+// Writes to "path.tmp-PID.EXT" in the same folder; finish() waits for the disk and renames it to `path`, or to what
+// `path` is a symbolic link to. Without finish() the temporary file is removed and a previous file stays intact.
+// Streams get everything in finish(). OpenImageIO's writers do not check every write, so the first failure is
+// remembered here and reported by finish(), a full disk included.
 class OutputFile : public OIIO::Filesystem::IOProxy {
  public:
   // `extension` with its dot. Throws Error(OutputFailed).
@@ -36,7 +48,10 @@ class OutputFile : public OIIO::Filesystem::IOProxy {
  private:
   void note(bool ok);
   bool synchronise() const;
+  void passOn();
 
+  const std::string path_;
+  const bool stream_;
   std::string target_, temporary_;
   std::FILE* file_ = nullptr;
   int64_t position_ = 0, size_ = 0;
