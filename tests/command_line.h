@@ -25,6 +25,15 @@ inline std::string readText(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
+// The options with the plain path-traced image and all layers, but for what they say themselves: for tests of what
+// files hold and of what does not depend on combining.
+inline std::string plainly(const std::string& options) {
+  std::string all = options;
+  for (const std::string plain : {"--integrator pt", "--combine none", "--aovs all"})
+    if (options.find(plain.substr(0, plain.find(' '))) == std::string::npos) all += " " + plain;
+  return all;
+}
+
 // Runs braid in the folder through the shell; `before` may set limits.
 inline Run braidRun(const Folder& folder, const std::string& arguments, const std::string& before = "") {
   const std::string out = folder.path / "stdout", err = folder.path / "stderr";

@@ -2,6 +2,7 @@
 // A braid that runs while a test looks at its files and sends it signals.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <string>
@@ -37,8 +38,10 @@ inline std::vector<Json> records(const fs::path& path, const std::string& event)
 // A command of braid on the Cornell box; what it prints goes to the test's own output or to the file named.
 class Process {
  public:
-  explicit Process(std::vector<std::string> words, const char* command = "render", const fs::path& printed = {}) {
+  explicit Process(std::vector<std::string> words, const std::string& command = "render",
+                   const fs::path& printed = {}) {
     words.insert(words.begin(), {BRAID_BINARY, command, kCornellFile, "-q"});
+    if (command == "render") makePlain(words);
     std::vector<char*> arguments;
     for (std::string& w : words) arguments.push_back(w.data());
     arguments.push_back(nullptr);
@@ -68,6 +71,13 @@ class Process {
   }
 
  private:
+  // Like plainly().
+  static void makePlain(std::vector<std::string>& words) {
+    for (const auto& [option, value] :
+         {std::pair("--integrator", "pt"), std::pair("--combine", "none"), std::pair("--aovs", "all")})
+      if (std::find(words.begin(), words.end(), option) == words.end()) words.insert(words.end(), {option, value});
+  }
+
   pid_t child_ = 0;
 };
 

@@ -37,7 +37,7 @@ std::string renderCommand(const std::string& rest, const std::string& scene = kC
     return rest.find(option) == std::string::npos ? std::string(" ") + option + value : std::string();
   };
   return "render " + scene + " -q" + unless("--size", " 24x16") + unless("--spp", " 2") + unless("-o ", " out.exr") +
-         " " + rest;
+         " " + test::plainly(rest);
 }
 
 ImageFile rendered(const Folder& folder, const std::string& rest, const std::string& scene = kCornell) {
@@ -72,7 +72,7 @@ std::vector<Json> records(const fs::path& log) {
 }
 
 const std::set<std::string> kHeadline = {"R", "G", "B"};
-const std::set<std::string> kFeatures = {"R", "G", "B", "Albedo", "N", "Depth", "Visibility"};
+const std::set<std::string> kFeatures = {"R", "G", "B", "Albedo", "N", "Depth", "Visibility", "Error"};
 
 }  // namespace
 

@@ -31,7 +31,8 @@ namespace fs = std::filesystem;
 namespace {
 
 Run rendered(const Folder& folder, const std::string& rest) {
-  const Run run = braidRun(folder, "render '" BRAID_SOURCE_DIR "/scenes/cornell.glb' -q --size 32x24 --spp 8 " + rest);
+  const Run run = braidRun(
+      folder, "render '" BRAID_SOURCE_DIR "/scenes/cornell.glb' -q --size 32x24 --spp 8 " + test::plainly(rest));
   INFO(run.err);
   REQUIRE(run.code == 0);
   return run;
@@ -292,7 +293,7 @@ TEST_CASE("Errors of combining end with their exit codes and one line") {
   const Folder folder;
   writeChannels(folder.path / "a.exr", {"R", "G", "B"});
   const auto refused = [&](const std::string& arguments, int code, const std::string& part) {
-    const Run run = braidRun(folder, arguments);
+    const Run run = braidRun(folder, arguments.starts_with("render") ? test::plainly(arguments) : arguments);
     INFO(arguments, ": ", run.err);
     CHECK(run.code == code);
     CHECK(contains(run.err, part));
@@ -324,9 +325,9 @@ TEST_CASE("Lists, plans and help show methods with their reasons and options") {
   for (const char* word : {"denoisers", "  box ", "  external ", "combiners", "  average ", "  easy "})
     CHECK_MESSAGE(contains(list.out, word), word);
   const std::string scene = "plan '" BRAID_SOURCE_DIR "/scenes/cornell.glb' ";
-  CHECK(contains(braidRun(folder, scene + "--combine easy@box").out, "+ easy@box: of pt and box"));
+  CHECK(contains(braidRun(folder, scene + "--integrator pt --combine easy@box").out, "+ easy@box: of pt and box"));
   CHECK(contains(braidRun(folder, scene + "--combine average --bases box").out, "- average: needs 2 bases"));
-  CHECK(contains(braidRun(folder, scene).out, "- history: "));
+  CHECK(contains(braidRun(folder, test::plainly(scene)).out, "- history: "));
   for (const char* command : {"combine", "render"})
     CHECK(contains(braidRun(folder, std::string(command) + " --help").out, "--box-radius"));
 }
@@ -335,7 +336,7 @@ TEST_CASE("auto fuses what an auto plan rendered, offline as in process") {
   const Folder folder;
   const Run run = braidRun(folder, "render '" BRAID_SOURCE_DIR
                                    "/scenes/torus_glass.glb' -q --size 48x27 --spp 8 "
-                                   "--integrator auto --combine auto --float -o a.exr --quarters --reproducible");
+                                   "--float -o a.exr --quarters --reproducible");
   INFO(run.err);
   REQUIRE(run.code == 0);
   const ImageFile a = readImage(folder.path / "a.exr");
@@ -352,8 +353,8 @@ TEST_CASE("auto fuses what an auto plan rendered, offline as in process") {
 TEST_CASE("auto filters direct and indirect light apart, offline as in process") {
   const Folder folder;
   const std::string options = "render '" BRAID_SOURCE_DIR "/scenes/cornell.glb' -q --size 48x27 --spp 8 --float ";
-  REQUIRE(braidRun(folder, options + "--combine auto --quarters --light-parts -o a.exr").code == 0);
-  REQUIRE(braidRun(folder, options + "--quarters --light-parts -o b.exr").code == 0);
+  REQUIRE(braidRun(folder, options + "--integrator pt --quarters --light-parts -o a.exr").code == 0);
+  REQUIRE(braidRun(folder, test::plainly(options + "--quarters --light-parts -o b.exr")).code == 0);
   const ImageFile a = readImage(folder.path / "a.exr");
   for (const char* layer : {"pt.direct", "pt.directA", "pt.directB", "pt.directVariance", "pt.indirectVariance"})
     CHECK_MESSAGE(hasLayer(a, layer), layer);

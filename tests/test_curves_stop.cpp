@@ -363,7 +363,7 @@ TEST_CASE("On the command line: combined later from the file, the stopped image 
     REQUIRE(run.code == 0);
     return run.err;
   };
-  const std::string view = "render '" BRAID_SOURCE_DIR "/scenes/cornell.glb' -q --size 24x18 --combine curves ",
+  const std::string view = "render '" BRAID_SOURCE_DIR "/scenes/cornell.glb' -q --size 24x18 --integrator pt --combine curves ",
                     stop = "--biased box --curves-stop 8 --float --history --reproducible ";
   must(view + stop + "--spp 24 -o whole.exr");
   must("combine -q --float --unbiased whole.exr --method curves --biased box --curves-stop 8 -o later.exr");

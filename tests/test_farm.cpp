@@ -330,7 +330,7 @@ TEST_CASE("A job printed by plan for make gives the image of the unsplit render,
   std::filesystem::copy_file(BRAID_SOURCE_DIR "/scenes/cornell.glb", folder.path / inner / "-box.glb");
   const std::string render =
       " -q --size 26x17 --integrator pt,crn --max-depth 5 --seed 3 --spp 10 --transparent --combine "
-      "js,uncorrelated --biased box --history ";
+      "js,uncorrelated --biased box --history --aovs all ";
   const std::string at = "cd \"" + inner + "\" && ";
   const Run plan = braidRun(folder,
                             "plan ./-box.glb" + render +

@@ -28,7 +28,7 @@ void must(const Folder& folder, const std::string& arguments) {
   CHECK(run.err.empty());
 }
 
-std::string render(const std::string& rest) { return "render " + kCornell + kView + rest; }
+std::string render(const std::string& rest) { return "render " + kCornell + test::plainly(kView + rest); }
 
 // One line on standard error with this exit code.
 std::string refusal(const Folder& folder, const std::string& arguments, int code) {
@@ -133,10 +133,11 @@ TEST_CASE("Runs that cannot be resumed or merged are refused with a sentence") {
   CHECK(contains(resume("--light-scale 2"), "--light-scale was 1 and is 2"));
   CHECK(contains(resume("--yfov 20"), "the camera was "));
   CHECK(contains(resume("--isa sse4.2"), "--isa was "));
-  CHECK(contains(
-      refusal(folder, "render '" BRAID_SOURCE_DIR "/scenes/furnace.glb'" + kView + "--resume a.state --spp 3 -o b.exr",
-              2),
-      "the scene's content was "));
+  CHECK(contains(refusal(folder,
+                         "render '" BRAID_SOURCE_DIR "/scenes/furnace.glb'" + kView +
+                             "--combine none --resume a.state --spp 3 -o b.exr",
+                         2),
+                 "the scene's content was "));
   CHECK(contains(refusal(folder, render("--resume none.state -o b.exr"), 2), "none.state: does not exist"));
   CHECK(contains(refusal(folder, render("--resume a.exr -o b.exr"), 2), "a.exr: is no state of braid"));
   CHECK(contains(refusal(folder, render("-o b.exr --resume"), 1), "--resume: name a file"));

@@ -32,7 +32,7 @@ namespace fs = braid::test::fs;
 namespace {
 
 std::vector<std::string> previewWords(const std::vector<std::string>& more) {
-  std::vector<std::string> words{"--http", "0", "--size", "48x32", "--threads", "1"};
+  std::vector<std::string> words{"--http", "0", "--size", "48x32", "--threads", "1", "--aovs", "all"};
   words.insert(words.end(), more.begin(), more.end());
   return words;
 }
@@ -240,7 +240,10 @@ TEST_CASE("A preview ends by its limits and by signals, and saves then") {
   CHECK(run.code == 0);
   CHECK(contains(run.err, "3 spp in "));
   CHECK(contains(run.err, "stopped by samples"));
-  CHECK(hasLayer(readImage(folder.path / "o.exr"), "pt.mean"));
+  const ImageFile saved = readImage(folder.path / "o.exr");
+  CHECK(hasLayer(saved, "Error"));
+  CHECK(hasLayer(saved, "Albedo"));
+  CHECK_FALSE(hasLayer(saved, "pt.mean"));
   CHECK(fs::exists(folder.path / "o.png"));
   CHECK(braidRun(folder, common + "--time 0.2 -q").code == 0);
   Preview preview(folder, {"-o", folder.path / "signal.exr"});

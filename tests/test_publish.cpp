@@ -161,11 +161,12 @@ TEST_CASE("Publishing changes no pixel, with and without combiners") {
   const Folder folder;
   for (const std::string& combine : {std::string(), std::string(" --combine js --biased box")}) {
     INFO(combine);
-    const std::string common = "render '" + kCornellFile + "' -q --size 80x48 --spp 400 --reproducible" + combine;
+    const std::string common =
+        "render '" + kCornellFile + "' -q " + test::plainly("--size 80x48 --spp 400 --reproducible" + combine);
     CHECK(
         braidRun(
             folder,
-            common + " -o often.exr --png often.png --checkpoint o.state --save-every 0.05 --threads 1 --log-json log")
+            common + " -o often.exr --png often.png --checkpoint o.state --overwrite --save-every 0.05 --threads 1 --log-json log")
             .code == 0);
     CHECK(braidRun(folder, common + " -o never.exr --save-every 0 --threads 2").code == 0);
     CHECK((readText(folder.path / "often.exr") == readText(folder.path / "never.exr")));
@@ -276,7 +277,8 @@ TEST_CASE("A limit of time holds for the whole process, and what it leaves no ti
 
 TEST_CASE("The first of samples, time and error ends the run, and the record says which") {
   const Folder folder;
-  const std::string common = "render '" + kCornellFile + "' --size 32x24 -o o.exr --log-json log ";
+  const std::string common =
+      "render '" + kCornellFile + "' " + test::plainly("--size 32x24 -o o.exr --log-json log ") + " ";
   const auto end = [&] { return records(folder.path / "log").back(); };
   Run run = braidRun(folder, common + "--error 0.01 --spp 100000 --time 60 --png o.png --checkpoint o.state");
   CHECK(run.code == 0);

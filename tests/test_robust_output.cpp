@@ -116,8 +116,9 @@ TEST_CASE("Killed at any moment, fifty times, a render leaves whole files and lo
   CHECK(worstLoss < kSaveEvery + 0.5);
 
   // What was saved is what a run without any of this would have had, and nothing else stays behind.
-  const std::string common = "render '" + kCornellFile + "' -q --size 24x16 --integrator pt,crn --reproducible --spp " +
-                             std::to_string(rounds + 3);
+  const std::string common = "render '" + kCornellFile +
+                             "' -q --size 24x16 --integrator pt,crn --reproducible --combine none " +
+                             "--aovs all --spp " + std::to_string(rounds + 3);
   REQUIRE(braidRun(folder, common + " --checkpoint k.state --resume -o k.exr").code == 0);
   REQUIRE(braidRun(folder, common + " -o whole.exr").code == 0);
   CHECK((readText(image) == readText(folder.path / "whole.exr")));
@@ -127,10 +128,10 @@ TEST_CASE("Killed at any moment, fifty times, a render leaves whole files and lo
 TEST_CASE("Interrupted, a render saves image and state alike; a second time, it leaves at once") {
   const Folder folder;
   const fs::path state = folder.path / "i.state", image = folder.path / "i.exr", log = folder.path / "log";
-  for (const int number : {SIGINT, SIGTERM}) {
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
     fs::remove(log);
-    Process process({"--size", "32x24", "--time", "60", "--checkpoint", state.string(), "-o", image.string(),
-                     "--log-json", log.string()});
+    Process process({"--size", "32x24", "--time", "60", "--checkpoint", state.string(), "--overwrite", "-o",
+                     image.string(), "--log-json", log.string()});
     REQUIRE(waitUntil([&] { return contains(readText(log), "\"progress\""); }));
     process.signal(number);
     CHECK(process.wait() == 130);
@@ -142,7 +143,7 @@ TEST_CASE("Interrupted, a render saves image and state alike; a second time, it 
   }
   // Rounds of seconds: the first signal alone would wait for one to end.
   const std::string before = readText(image), stateBefore = readText(state);
-  Process slow({"--size", "4096x4096", "--aovs", "none", "--time", "600", "--threads", "1", "--checkpoint",
+  Process slow({"--size", "4096x4096", "--aovs", "none", "--time", "600", "--threads", "1", "--overwrite", "--checkpoint",
                 state.string(), "-o", image.string()});
   sleepFor(1);
   slow.signal(SIGINT);
@@ -158,7 +159,7 @@ TEST_CASE("Interrupted, a render saves image and state alike; a second time, it 
 TEST_CASE("A full disk ends in exit code 3 with the previous files intact") {
   const Folder folder;
   const auto run = [&](const std::string& rest, const std::string& before = "") {
-    return braidRun(folder, "render '" + kCornellFile + "' -q " + rest, before);
+    return braidRun(folder, "render '" + kCornellFile + "' -q " + test::plainly(rest), before);
   };
   const auto checkIntact = [&](const fs::path& where, const std::string& image, const std::string& state) {
     CHECK((readText(where / "o.exr") == image));  // in parentheses: bytes are not to be printed
@@ -167,7 +168,7 @@ TEST_CASE("A full disk ends in exit code 3 with the previous files intact") {
   };
   // Files may grow to 64 KiB only.
   fs::create_directories(folder.path / "limit");
-  const std::string files = " -o limit/o.exr --checkpoint limit/o.state";
+  const std::string files = " -o limit/o.exr --checkpoint limit/o.state --overwrite";
   REQUIRE(run("--size 8x8 --spp 2" + files).code == 0);
   std::string image = readText(folder.path / "limit" / "o.exr"), state = readText(folder.path / "limit" / "o.state");
   Run full = run("--size 96x96 --spp 2" + files, "trap '' XFSZ; ulimit -f 128; ");
@@ -183,7 +184,7 @@ TEST_CASE("A full disk ends in exit code 3 with the previous files intact") {
 
   const TinyDisk disk(folder.path / "disk", "size=400k");
   if (!disk.mounted()) return;
-  const std::string there = " -o disk/o.exr --checkpoint disk/o.state";
+  const std::string there = " -o disk/o.exr --checkpoint disk/o.state --overwrite";
   REQUIRE(run("--size 8x8 --spp 2" + there).code == 0);
   image = readText(folder.path / "disk" / "o.exr");
   state = readText(folder.path / "disk" / "o.state");

@@ -86,13 +86,13 @@ SweepMethod boxMethod() {
 }  // namespace
 
 TEST_CASE("Ladders double from rung to rung and mistakes are named") {
-  CHECK(parseLadder("4:32", "--spp", false) == std::vector<double>{4, 8, 16, 32});
-  CHECK(parseLadder("3:20", "--spp", false) == std::vector<double>{3, 6, 12});
-  CHECK(parseLadder("16,4,16", "--spp", false) == std::vector<double>{4, 16});
-  CHECK(parseLadder("30s:2m", "--time", true) == std::vector<double>{30, 60, 120});
-  CHECK(parseLadder("0.5", "--time", true) == std::vector<double>{0.5});
+  CHECK(parseLadder("4:32", false) == std::vector<double>{4, 8, 16, 32});
+  CHECK(parseLadder("3:20", false) == std::vector<double>{3, 6, 12});
+  CHECK(parseLadder("16,4,16", false) == std::vector<double>{4, 16});
+  CHECK(parseLadder("30s:2m", true) == std::vector<double>{30, 60, 120});
+  CHECK(parseLadder("0.5", true) == std::vector<double>{0.5});
   for (const char* wrong : {"", "8:4", "0:4", "1:2:3", "4,x", "-4", "1.5"})
-    CHECK_MESSAGE(failureOf([&] { parseLadder(wrong, "--spp", false); }).first == ExitCode::Usage, wrong);
+    CHECK_MESSAGE(failureOf([&] { parseLadder(wrong, false); }).first == ExitCode::Usage, wrong);
 }
 
 TEST_CASE("Scenes of one stem are told apart by their folders") {
@@ -422,6 +422,11 @@ TEST_CASE("Names of methods are integrators, or denoisers and combiners with the
   CHECK(inputs("pt") == Names{"pt"});
   CHECK(inputs("box") == Names{"pt"});
   CHECK(inputs("bdpt+sppm/auto") == Names{"bdpt", "sppm"});
+  // By default the plain image, and what a render makes of the scene when nothing is said.
+  CHECK(SweepOptions().methods == Names{"pt", "auto/auto"});
+  const std::vector<SweepMethod> planned = sweepMethods({"auto/auto"}, test::integrators(), {}, "pt+sppm");
+  CHECK(planned.at(0).name == "auto/auto");
+  CHECK(planned.at(0).inputs == std::vector<MethodShare>{{"pt", 1}, {"sppm", 1}});
   for (const Integrator* i : test::integrators()) {
     const std::string name = i->name();
     if (name == "pt") continue;

@@ -308,7 +308,8 @@ TEST_CASE("An address that is none is refused") {
 TEST_CASE("render --tev shows what it saves, and no viewer changes a pixel") {
   const Folder folder;
   const std::string common =
-      "render '" + kCornellFile + "' --size 64x48 --spp 200 --reproducible --float --combine js --biased box";
+      "render '" + kCornellFile +
+      "' --size 64x48 --spp 200 --reproducible --float --combine js --biased box --integrator pt --aovs all";
   CHECK(braidRun(folder, common + " -q -o alone.exr").code == 0);
   const Run run = braidRun(folder, common + " -o absent.exr --tev 127.0.0.1:" + std::to_string(freePort()));
   CHECK(run.code == 0);

@@ -18,6 +18,7 @@
 #include "tools/bench_publishing.h"
 #include "tools/builtin_scenes.h"
 #include "tools/cli.h"
+#include "tools/option_checks.h"
 #include "version.h"
 
 namespace braid {
@@ -327,18 +328,26 @@ void addBench(CLI::App& app, Action& action) {
   command->footer(
       "Example:\n  braid bench                 the built-in Cornell box and its million-triangle variant\n  braid "
       "bench scene.glb --json");
-  command->add_option("SCENE", o.scenes,
-                      "glTF files, builtin:cornell or builtin:million (default: both built-in ones)");
-  command->add_option("--size", o.size, "Frame, WIDTHxHEIGHT")->capture_default_str();
+  command->add_option("SCENE", o.scenes, "glTF files, builtin:cornell or builtin:million (default: both built-in ones)")
+      ->type_name("FILE");
+  command->add_option("--size", o.size, "Frame in pixels")
+      ->capture_default_str()
+      ->check(readBy(parseSize))
+      ->type_name("WIDTHxHEIGHT");
   command->add_option("--repeats", o.repeats, "Interleaved measurements; the median counts")
       ->capture_default_str()
-      ->check(CLI::Range(1, 1000));
+      ->check(wholeNumber(1, 1000));
   command->add_option("--isa", o.isa, "Instruction set for Embree: avx2, avx512, sse4.2, or auto")
-      ->capture_default_str();
-  command->add_option("--combine", o.combine,
-                      "Measure these denoisers and combiners, separated by commas, instead of rays");
-  command->add_option("--publish", o.publish,
-                      "Measure what publishing images combined by these adds to the passes, instead of rays");
+      ->capture_default_str()
+      ->type_name("NAME");
+  command
+      ->add_option("--combine", o.combine,
+                   "Measure these denoisers and combiners, separated by commas, instead of rays")
+      ->type_name("NAMES");
+  command
+      ->add_option("--publish", o.publish,
+                   "Measure what publishing images combined by these adds to the passes, instead of rays")
+      ->type_name("NAMES");
   command->add_flag("--json", o.json, "As JSON");
   addSampleOptions(*command, o.samples);
   command->callback([options, &action] { action = [options] { return runBench(*options); }; });

@@ -66,7 +66,8 @@ nlohmann::json benchPublishing(const Scene& scene, const CameraData& camera, con
   Plan plan = makePlan(scene, camera, settings, pointersTo(integrators));
   const TemporaryFile file;
   PublishOptions options;
-  options.image.exr = file.path();
+  options.image.file = file.path();
+  options.image.aovs = "all";
   options.image.combine.combine = methods;
   options.threads = settings.threads;
   requireRunnable(planCombining(options.image.combine, settings.spp, plan), options.image.combine.wanted());

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the subcommands share: options that choose a scene and a view, loading with its warnings, and parsing of
-// durations and sizes.
+// What the subcommands share: options that choose a scene, a view and samples, and loading with its warnings.
 #pragma once
 
 #include <functional>
@@ -12,6 +11,7 @@
 #include "renderer/scene/gltf.h"
 #include "renderer/scene/scene.h"
 #include "renderer/session/settings.h"
+#include "tools/option_texts.h"
 
 namespace CLI {
 class App;
@@ -33,11 +33,12 @@ void addCombine(CLI::App& app, Action& action);
 void addMerge(CLI::App& app, Action& action);
 void addSweep(CLI::App& app, Action& action);
 
-// The items between commas, without empty ones.
-std::vector<std::string> splitList(const std::string& text);
-
-// Seconds from `90`, `90s`, `2m`, `1h` or a sum such as `1h30m`. Throws Error(Usage).
-double parseDuration(const std::string& text);
+// The options of braid itself, and all subcommands.
+struct MainOptions {
+  bool list = false;
+  std::string memoryLimit;
+};
+void addCommands(CLI::App& app, MainOptions& options, Action& action);
 
 // Options of every subcommand that reads a scene and looks at it.
 struct SceneChoice {

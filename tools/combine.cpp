@@ -9,9 +9,13 @@
 #include "combiners/registry.h"
 #include "renderer/core/error.h"
 #include "renderer/film/exr.h"
+#include "renderer/film/picture.h"
 #include "tools/cli.h"
 #include "tools/combining.h"
 #include "tools/estimates_file.h"
+#include "tools/file_uses.h"
+#include "tools/image_output.h"
+#include "tools/option_checks.h"
 #include "tools/output_options.h"
 #include "tools/same_view.h"
 #include "version.h"
@@ -152,10 +156,35 @@ std::string runnable(const Estimates& all, const RecipeOptions& roles) {
   return names.empty() ? "; nothing can run on these files" : "; what can run on these files: " + names;
 }
 
+// "FILE:ESTIMATE" and "FILE,HALFA,HALFB" are files too.
+void addInput(FileUses& uses, const std::string& what, const std::string& text) {
+  for (const std::string& file : splitList(text)) {
+    uses.input(what, file);
+    uses.input(what, file.substr(0, file.rfind(':')));
+  }
+}
+
+void checkOutputs(const CombineOptions& o) {
+  FileUses uses;
+  addInput(uses, "an input of --unbiased", o.unbiased);
+  addInput(uses, "an input of --correlated", o.correlated);
+  addInput(uses, "an input of --biased", o.choice.biased);
+  addInput(uses, "an input of --bases", o.choice.bases);
+  uses.input("the reference", o.reference);
+  for (const std::string* methods : {&o.choice.combine, &o.choice.denoisers, &o.choice.biased, &o.choice.bases})
+    uses.methods(*methods);
+  uses.output("--output", o.output);
+  uses.output("--png", o.png);
+  uses.check();
+  ImageOutput files;
+  files.file = o.output;
+  files.png = o.png;
+  checkImageFiles(files);
+}
+
 int runCombine(const CombineOptions& o) {
   const AovSet aovs = parseAovs(o.aovs);
-  checkWritable(o.output);
-  if (!o.png.empty()) checkWritable(o.png);
+  checkOutputs(o);
   const std::vector<std::string> wanted = o.choice.wanted();
   if (wanted.empty()) throw Error(ExitCode::Usage, "--method: name at least one method (braid --list)");
   for (const std::string& name : wanted) makeRecipe({}, {name}, {});  // unknown names first
@@ -188,13 +217,13 @@ int runCombine(const CombineOptions& o) {
   exr.quarters = o.quarters;
   exr.floatHeadline = o.floatHeadline;
   exr.layers = combined.layers();
-  const WriteReport report = writeExr(o.output, all, *combined.headline(), in.alpha.empty() ? nullptr : &in.alpha, exr);
-  if (!o.png.empty()) writePng(o.png, *combined.headline(), static_cast<float>(o.exposure));
+  const Plane<float>* alpha = in.alpha.empty() ? nullptr : &in.alpha;
+  const std::string clamped = writeImageFile(o.output, all, *combined.headline(), alpha, exr, o.exposure);
+  if (!o.png.empty())
+    writePicture(o.png, ImageFormat::Png, *combined.headline(), alpha, static_cast<float>(o.exposure));
   if (o.quiet) return 0;
   for (const std::string& line : combineWarnings(result)) fmt::print(stderr, "warning: {}\n", line);
-  if (report.clampedToHalf > 0)
-    fmt::print(stderr, "warning: {}: {} values above 65504 were clamped to fit half floats: use --float\n", o.output,
-               report.clampedToHalf);
+  if (!clamped.empty()) fmt::print(stderr, "warning: {}\n", clamped);
   fmt::print(stderr, "{}", recipeText(recipe));
   for (const PipelineOutput& out : result.outputs)
     if (out.ran())
@@ -213,26 +242,41 @@ void addCombine(CLI::App& app, Action& action) {
       ->add_option("--unbiased", o.unbiased,
                    "FILE, or FILE:ESTIMATE of braid's, FILE:LAYER of others'; HALFA,HALFB: two renders with "
                    "different seeds; or FILE,HALFA,HALFB")
-      ->required();
-  command->add_option("--correlated", o.correlated, "The same, for the estimate by common random numbers or gradients");
-  command->add_option("--reference", o.reference,
-                      "Image that the true errors are measured by, for ideal and ensemble-oracle");
+      ->required()
+      ->type_name("FILES");
+  command->add_option("--correlated", o.correlated, "The same, for the estimate by common random numbers or gradients")
+      ->type_name("FILES");
+  command
+      ->add_option("--reference", o.reference,
+                   "Image that the true errors are measured by, for ideal and ensemble-oracle")
+      ->type_name("FILE");
   command
       ->add_option("--method", o.choice.combine, "Methods to run, separated by commas; the last one is the image R G B")
-      ->required();
-  command->add_option("-o,--output", o.output, "EXR file to write")->required();
+      ->required()
+      ->type_name("NAMES");
+  command
+      ->add_option("-o,--output", o.output,
+                   "Image to write, by its ending: .exr with layers; .png, .jpg tone-mapped; .hdr, .tif linear; - is "
+                   "EXR to standard output")
+      ->required()
+      ->type_name("FILE");
   addCombineOptions(*command, o.choice);
   command->get_option("--biased")
       ->description("Biased input: a file as for --unbiased, an estimate, a denoiser or another combiner");
-  command->add_option("--spp", o.samplesPerPixel,
-                      "Samples per pixel of the unbiased image, where its file does not say");
-  command->add_option("--png", o.png, "Also write a tone-mapped PNG");
-  command->add_option("--exposure", o.exposure, "Exposure of the PNG in stops")->capture_default_str();
-  command->add_option("--aovs", o.aovs, "Layers besides the image: none, features or all")->capture_default_str();
+  command
+      ->add_option("--spp", o.samplesPerPixel, "Samples per pixel of the unbiased image, where its file does not say")
+      ->check(wholeNumber(1, kMostSamples));
+  command->add_option("--png", o.png, "Also write a tone-mapped PNG")->type_name("FILE");
+  command->add_option("--exposure", o.exposure, "Exposure of PNG and JPEG in stops")
+      ->capture_default_str()
+      ->check(number(-64, 64));
+  command->add_option("--aovs", o.aovs, "Layers besides the image: none, features or all")
+      ->capture_default_str()
+      ->type_name("SET");
   command->add_flag("--quarters", o.quarters, "Also write the four quarter buffers");
   command->add_flag("--float", o.floatHeadline, "R G B as 32-bit floats");
   command->add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
-  command->add_option("--threads", o.threads, "Worker threads (default: all)")->check(CLI::Range(0, 4096));
+  addThreads(*command, o.threads);
   command->add_flag("-q,--quiet", o.quiet, "Errors only");
   command->footer(
       methodList() +

@@ -15,6 +15,7 @@
 #include "renderer/core/parallel.h"
 #include "renderer/film/error_map.h"
 #include "tools/cli.h"
+#include "tools/option_checks.h"
 
 namespace braid {
 
@@ -78,11 +79,15 @@ PipelineOptions CombineChoice::options(const std::atomic<bool>* cancel) const {
 }
 
 void addCombineOptions(CLI::App& command, CombineChoice& c) {
-  command.add_option("--denoiser", c.denoisers,
-                     "Denoisers to run and keep, separated by commas, the preferred one first");
-  command.add_option("--biased", c.biased,
-                     "Biased input of combiners: an estimate, a denoiser or another combiner (--list)");
-  command.add_option("--bases", c.bases, "Images that ensembles choose from, by name, separated by commas");
+  command
+      .add_option("--denoiser", c.denoisers, "Denoisers to run and keep, separated by commas, the preferred one first")
+      ->type_name("NAMES");
+  command
+      .add_option("--biased", c.biased,
+                  "Biased input of combiners: an estimate, a denoiser or another combiner (--list)")
+      ->type_name("NAME");
+  command.add_option("--bases", c.bases, "Images that ensembles choose from, by name, separated by commas")
+      ->type_name("NAMES");
   command.add_flag("--weights", c.weights, "Also write the maps of weights that combiners worked out");
   const std::vector<OptionInfo> infos = allMethodOptions();
   c.numbers.assign(infos.size(), std::numeric_limits<double>::quiet_NaN());
@@ -91,7 +96,17 @@ void addCombineOptions(CLI::App& command, CombineChoice& c) {
         .add_option_function<double>(
             "--" + infos[i].name, [&c, i](const double& value) { c.numbers[i] = value; },
             fmt::format("{} (default {})", infos[i].description, infos[i].fallback))
+        ->check(numberOf(infos[i]))
         ->group("Options of methods");
+}
+
+void combineByDefault(CombineChoice& choice) {
+  choice.combine = kDefaultMethod;
+  choice.asked = false;
+}
+
+void noteWhoAsked(const CLI::App& command, CombineChoice& choice) {
+  choice.asked = command.get_option("--combine")->count() > 0;
 }
 
 std::string methodList() {
@@ -177,8 +192,8 @@ CombinedLayers::CombinedLayers(const PipelineResult& result, const std::vector<s
     add("combined." + layerName(name), &out->result.image.mean, nullptr);
   }
   if (!last) {
-    // An integrator is the headline: if it is biased and knows by how much, its error is more than its variance.
-    if (!estimates.estimates.empty() && !estimates.estimates.front().bias.empty()) {
+    // An integrator is the headline.
+    if (!estimates.estimates.empty() && knowsError(estimates.estimates.front())) {
       integratorsError_ = errorMap(estimates.estimates.front());
       add("Error", nullptr, &integratorsError_);
     }
@@ -196,7 +211,7 @@ void CombinedLayers::add(const std::string& name, const Rgb<float>* image, const
     list_.push_back({name, image, plane});
 }
 
-std::vector<std::string> combineWarnings(const PipelineResult& result) {
+std::vector<std::string> combineWarnings(const PipelineResult& result, bool asked) {
   std::vector<std::string> lines;
   const SanitiseReport& s = result.sanitised;
   if (s.nonFinite > 0)
@@ -208,7 +223,7 @@ std::vector<std::string> combineWarnings(const PipelineResult& result) {
     lines.push_back(fmt::format("inputs of combiners: {} negative variances count as 0, {} values were limited",
                                 s.negativeVariance, s.outOfRange));
   for (const PipelineOutput& out : result.outputs) {
-    if (!out.ran()) lines.push_back(fmt::format("{} did not run: {}", out.step.name, out.step.obstacle));
+    if (!out.ran() && asked) lines.push_back(fmt::format("{} did not run: {}", out.step.name, out.step.obstacle));
     if (!out.step.note.empty()) lines.push_back(fmt::format("{} {}", out.step.name, out.step.note));
   }
   return lines;

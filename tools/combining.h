@@ -18,11 +18,12 @@ class App;
 
 namespace braid {
 
-// What `braid render` combines when nothing is said.
-inline constexpr const char* kDefaultCombine = "none";
+// What renders combine when nothing is said.
+inline constexpr const char* kDefaultMethod = "auto";
 
 struct CombineChoice {
-  std::string combine = kDefaultCombine;  // none, or names separated by commas; the last one is the headline
+  std::string combine = "none";  // or names separated by commas; the last one is the headline
+  bool asked = true;             // by the user: what is a default only is left out where it cannot run
   std::string denoisers, biased, bases;
   bool weights = false;  // also write the maps of weights
   // Values of method options, in the order of allMethodOptions(); not a number: the default.
@@ -34,6 +35,10 @@ struct CombineChoice {
 
 // --denoiser, --biased, --bases, --weights and the options of every registered method.
 void addCombineOptions(CLI::App& command, CombineChoice& choice);
+// Makes kDefaultMethod the default of a command, before its options are added.
+void combineByDefault(CombineChoice& choice);
+// After parsing: whether the user named what to combine.
+void noteWhoAsked(const CLI::App& command, CombineChoice& choice);
 // One line a method for the help of commands.
 std::string methodList();
 
@@ -73,7 +78,7 @@ class CombinedLayers {
   const Rgb<float>* headline_ = nullptr;
 };
 
-// Lines about bad input values and methods that did not run.
-std::vector<std::string> combineWarnings(const PipelineResult& result);
+// Lines about bad input values and, where they were asked for, methods that did not run.
+std::vector<std::string> combineWarnings(const PipelineResult& result, bool asked = true);
 
 }  // namespace braid

@@ -13,6 +13,7 @@
 #include "renderer/core/error.h"
 #include "renderer/film/exr.h"
 #include "tools/metrics/metrics.h"
+#include "tools/option_checks.h"
 
 namespace braid {
 
@@ -48,10 +49,53 @@ void checkOptions(const CompareOptions& options, const Metric& first) {
     throw Error(ExitCode::Usage, fmt::format("--min: {} is better when smaller; use --max", first.name));
 }
 
+// An image and where it lies.
+struct Placed {
+  Rgb<float> image;
+  PixelWindow window;
+  int fullWidth = 0, fullHeight = 0;
+};
+
+std::string text(const PixelWindow& w) { return fmt::format("{},{},{},{}", w.x0, w.y0, w.x1, w.y1); }
+
+// What the windows share of one frame. Formats without windows, and other frames, are compared as they are.
+std::optional<PixelWindow> sharedWindow(const CompareOptions& options, const Placed& a, const Placed& b) {
+  const bool sameFrame = a.fullWidth == b.fullWidth && a.fullHeight == b.fullHeight;
+  const bool sameSize = a.image.width() == b.image.width() && a.image.height() == b.image.height();
+  if (a.window == b.window || (!sameFrame && sameSize)) return {};
+  if (!sameFrame)
+    throw Error(ExitCode::BadInput,
+                fmt::format("{}: {}x{} pixels, but {} has {}x{}; compare images of one size",
+                            options.image, a.image.width(), a.image.height(), options.reference, b.image.width(),
+                            b.image.height()));
+  const PixelWindow shared{std::max(a.window.x0, b.window.x0), std::max(a.window.y0, b.window.y0),
+                           std::min(a.window.x1, b.window.x1), std::min(a.window.y1, b.window.y1)};
+  if (shared.width() <= 0 || shared.height() <= 0)
+    throw Error(
+        ExitCode::BadInput,
+        fmt::format("{}: its window {} and the window {} of {} share no pixel of the {}x{} frame", options.image,
+                    text(a.window), text(b.window), options.reference, a.fullWidth, a.fullHeight));
+  return shared;
+}
+
+void cut(Placed& placed, const PixelWindow& window) {
+  Rgb<float> part(window.width(), window.height());
+  for (size_t c = 0; c < 3; ++c)
+    for (int y = 0; y < part.height(); ++y)
+      for (int x = 0; x < part.width(); ++x)
+        part[c].at(x, y) = placed.image[c].at(x + window.x0 - placed.window.x0, y + window.y0 - placed.window.y0);
+  placed.image = std::move(part);
+}
+
 // "pt" means "pt.mean", the mean image of that estimate.
 Rgb<float> loadLayer(const ImageFile& file, const std::string& layer) {
   const std::string mean = layer + ".mean";
   return file.rgb(!layer.empty() && !hasLayer(file, layer) && hasLayer(file, mean) ? mean : layer);
+}
+
+Placed load(const std::string& path, const std::string& layer) {
+  const ImageFile file = readImage(path);
+  return {loadLayer(file, layer), file.window, file.fullWidth, file.fullHeight};
 }
 
 void printText(const std::vector<Measured>& all, std::ostream& out) {
@@ -59,8 +103,8 @@ void printText(const std::vector<Measured>& all, std::ostream& out) {
 }
 
 // Infinite values are null in JSON; `invalidPixels` or equal images (PSNR) say why.
-void printJson(const CompareOptions& options, const Rgb<float>& image, const std::vector<Measured>& all, bool passed,
-               std::ostream& out) {
+void printJson(const CompareOptions& options, const Rgb<float>& image, const std::optional<PixelWindow>& window,
+               const std::vector<Measured>& all, bool passed, std::ostream& out) {
   nlohmann::ordered_json json;
   json["schema"] = 1;
   json["image"] = options.image;
@@ -69,6 +113,7 @@ void printJson(const CompareOptions& options, const Rgb<float>& image, const std
   if (!options.referenceLayer.empty()) json["referenceLayer"] = options.referenceLayer;
   json["width"] = image.width();
   json["height"] = image.height();
+  if (window) json["window"] = {window->x0, window->y0, window->x1, window->y1};
   json["trimPercent"] = options.trimPercent;
   json["excludedReferencePixels"] = all[0].result.excluded;
   json["invalidPixels"] = all[0].result.invalid;
@@ -97,12 +142,14 @@ void warn(const CompareOptions& options, const Measured& m, const std::string& t
 int runCompare(const CompareOptions& options, std::ostream& out, std::ostream& warnings) {
   const std::vector<const Metric*> chosen = chosenMetrics(options);
   checkOptions(options, *chosen[0]);
-  const Rgb<float> image = loadLayer(readImage(options.image), options.layer);
-  const Rgb<float> reference = loadLayer(readImage(options.reference), options.referenceLayer);
-  if (image.width() != reference.width() || image.height() != reference.height())
-    throw Error(ExitCode::BadInput,
-                fmt::format("{}: {}x{} pixels, but {} has {}x{}; compare images of one size", options.image,
-                            image.width(), image.height(), options.reference, reference.width(), reference.height()));
+  Placed placed = load(options.image, options.layer), by = load(options.reference, options.referenceLayer);
+  const std::optional<PixelWindow> window = sharedWindow(options, placed, by);
+  if (window) {
+    cut(placed, *window);
+    cut(by, *window);
+    warnings << fmt::format("note: compared in the window {}, which both images hold\n", text(*window));
+  }
+  const Rgb<float>&image = placed.image, &reference = by.image;
   std::vector<Measured> all;
   for (const Metric* m : chosen) all.push_back({m, evaluate(*m, image, reference, options.trimPercent)});
 
@@ -113,7 +160,7 @@ int runCompare(const CompareOptions& options, std::ostream& out, std::ostream& w
   if (options.min && !(first >= *options.min))
     failure = fmt::format("{} {:.6g} is below --min {:.6g}", all[0].metric->name, first, *options.min);
   if (options.json)
-    printJson(options, image, all, failure.empty(), out);
+    printJson(options, image, window, all, failure.empty(), out);
   else
     printText(all, out);
   warn(options, all[0], failure, warnings);
@@ -123,19 +170,26 @@ int runCompare(const CompareOptions& options, std::ostream& out, std::ostream& w
 void addCompare(CLI::App& app, std::function<int()>& action) {
   CLI::App* sub = app.add_subcommand("compare", "Error metrics of an image against a reference");
   const auto options = std::make_shared<CompareOptions>();
-  sub->add_option("image", options->image, "The image to judge (EXR, HDR, PFM, PNG, …)")->required();
-  sub->add_option("reference", options->reference, "The image to judge it by, of the same size")->required();
+  sub->add_option("image", options->image, "The image to judge (EXR, HDR, PFM, PNG, …)")->required()->type_name("FILE");
+  sub->add_option("reference", options->reference, "The image to judge it by, of the same frame")
+      ->required()
+      ->type_name("FILE");
   sub->add_option("--metric", options->metrics, "Metrics, separated by commas (default: all)")
       ->delimiter(',')
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->type_name("NAMES");
   sub->add_flag("--json", options->json, "Print one JSON object");
-  sub->add_option("--max", options->max, "Exit with 6 when the first metric is above this");
+  sub->add_option("--max", options->max, "Exit with 6 when the first metric is above this")
+      ->check(number(-kLargeNumber, kLargeNumber));
   sub->add_option("--min", options->min,
-                  "Exit with 6 when the first metric, one that is better when larger, is below this");
+                  "Exit with 6 when the first metric, one that is better when larger, is below this")
+      ->check(number(-kLargeNumber, kLargeNumber));
   sub->add_option("--trim", options->trimPercent, "Leave out the worst this many percent of the pixels")
-      ->check(CLI::Range(0.0, 100.0));
-  sub->add_option("--layer", options->layer, "Layer of the image, such as pt or pt.halfA (default: R G B)");
-  sub->add_option("--reference-layer", options->referenceLayer, "Layer of the reference (default: R G B)");
+      ->check(number(0, 100, Ends::MostExcluded));
+  sub->add_option("--layer", options->layer, "Layer of the image, such as pt or pt.halfA (default: R G B)")
+      ->type_name("NAME");
+  sub->add_option("--reference-layer", options->referenceLayer, "Layer of the reference (default: R G B)")
+      ->type_name("NAME");
   std::string footer = "Metrics:\n";
   for (const Metric& m : metricRegistry()) footer += fmt::format("  {:<7} {}\n", m.name, m.description);
   footer +=

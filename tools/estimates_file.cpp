@@ -275,6 +275,20 @@ std::vector<Attribute> estimateAttributes(const Estimates& all, bool timing) {
   return list;
 }
 
+// A file of braid without estimates is what renders write unless they are told otherwise.
+void noteMissingEstimates(const ImageFile& file, const ReadOptions& options) {
+  const Attribute *software = find(file, "Software"), *headline = find(file, "braid/headline");
+  if (options.role != ImageRole::Noisy || !software || !software->text.starts_with("braid ")) return;
+  if (headline)
+    throw Error(ExitCode::BadInput,
+                fmt::format("{}: holds the image that {} made, and not the estimates with halves and variances that it "
+                            "was made of: render it with --aovs all",
+                            file.path, headline->text));
+  if (options.notes)
+    options.notes->push_back(fmt::format(
+        "{}: its halves, variances and noise of features were not saved: render it with --aovs all", file.path));
+}
+
 Estimates readEstimates(const ImageFile& file, const ReadOptions& options) {
   const std::vector<std::string> layers = estimateNames(file);
   if (!layers.empty()) {
@@ -282,6 +296,7 @@ Estimates readEstimates(const ImageFile& file, const ReadOptions& options) {
       *options.alpha = alpha->second;
     return readBraid(file, layers);
   }
+  noteMissingEstimates(file, options);
   Estimates all = emptyLike(file);
   ForeignImage foreign = readForeign(file, options.role == ImageRole::Denoised, options.samplesPerPixel, options.layer);
   foreign.estimate.name = options.foreignName;

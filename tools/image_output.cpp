@@ -8,9 +8,13 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 #include "renderer/core/stopwatch.h"
 #include "renderer/film/error_map.h"
+#include "renderer/film/output_file.h"
+#include "renderer/film/picture.h"
+#include "tools/option_checks.h"
 #include "tools/output_options.h"
 #include "tools/progress_line.h"
 #include "tools/told_error.h"
@@ -25,8 +29,6 @@ const MethodResult* headlineOf(const PipelineResult& combined, const std::vector
     if (const PipelineOutput* out = combined.find(wanted[i - 1]); out && out->ran()) return &out->result;
   return nullptr;
 }
-
-bool knowsError(const Estimate& e) { return e.passes >= 2 && !e.variance.empty(); }
 
 // The error of the last wanted method that ran, or of the first integrator.
 std::optional<double> headlineError(const PipelineResult& combined, const std::vector<std::string>& wanted,
@@ -59,27 +61,83 @@ void bothWhateverFails(const std::function<void()>& one, const std::function<voi
 
 std::vector<std::string> ImageOutput::files() const {
   std::vector<std::string> list;
-  for (const std::string& name : {exr, png})
+  for (const std::string& name : {file, png})
     if (!name.empty()) list.push_back(name);
   return list;
+}
+
+AovSet ImageOutput::aovSet() const {
+  if (!aovs.empty()) return parseAovs(aovs);
+  const bool more = quarters || history || lightParts || combine.weights || !combine.denoisers.empty();
+  return more ? AovSet::All : AovSet::Features;
+}
+
+ImageOutput ImageOutput::replaceable() const {
+  ImageOutput output = *this;
+  for (std::string* name : {&output.file, &output.png})
+    if (isStream(*name)) name->clear();
+  return output;
+}
+
+ImageOutput ImageOutput::plain() const {
+  ImageOutput output = *this;
+  output.combine.combine = "none";
+  output.combine.denoisers.clear();
+  return output;
+}
+
+void checkImageFiles(const ImageOutput& output) {
+  if (!output.file.empty()) imageFormat(output.file);
+  if (!output.png.empty() && !isStream(output.png) && imageFormat(output.png) != ImageFormat::Png)
+    throw Error(ExitCode::Usage,
+                fmt::format("--png {}: writes PNG: name a file that ends in .png, or use -o", output.png));
+  for (const std::string& file : output.files()) prepareOutput(file);
+}
+
+std::string writeImageFile(const std::string& path, const Estimates& estimates, const Rgb<float>& image,
+                           const Plane<float>* alpha, const ExrOptions& exr, double exposureStops) {
+  const ImageFormat format = imageFormat(path);
+  if (format != ImageFormat::Exr) {
+    writePicture(path, format, image, alpha, static_cast<float>(exposureStops));
+    return "";
+  }
+  const WriteReport report = writeExr(path, estimates, image, alpha, exr);
+  if (report.clampedToHalf == 0) return "";
+  return fmt::format("{}: {} values above 65504 were clamped to fit half floats: use --float", path,
+                     report.clampedToHalf);
 }
 
 void addImageOptions(CLI::App& command, ImageOutput& o) {
   command
       .add_option("--combine", o.combine.combine,
                   "none, or denoisers and combiners separated by commas (--list); the last one is the image R G B")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->type_name("NAMES");
   addCombineOptions(command, o.combine);
-  command.add_option("-o,--output", o.exr, "EXR file to write");
-  command.add_option("--png", o.png, "Also write a tone-mapped PNG");
-  command.add_option("--exposure", o.exposure, "Exposure of the PNG in stops")->capture_default_str();
-  command.add_option("--aovs", o.aovs, "Layers besides the image: none, features or all")->capture_default_str();
+  command
+      .add_option("-o,--output", o.file,
+                  "Image to write, by its ending: .exr with layers; .png, .jpg tone-mapped; .hdr, .tif linear; "
+                  "- is EXR to standard output")
+      ->type_name("FILE");
+  command.add_option("--png", o.png, "Also write a tone-mapped PNG")->type_name("FILE");
+  command.add_option("--exposure", o.exposure, "Exposure of PNG and JPEG in stops")
+      ->capture_default_str()
+      ->check(number(-64, 64));
+  command
+      .add_option("--aovs", o.aovs,
+                  fmt::format("Layers of the EXR besides the image: none; features, with the image's error; or all, "
+                              "which combining the file later takes (default: {})",
+                              o.aovs.empty() ? "features; all with --quarters, --light-parts, --history, --weights or "
+                                               "--denoiser"
+                                             : o.aovs))
+      ->type_name("SET");
   command.add_flag("--quarters", o.quarters, "Also write the four quarter buffers");
   command.add_flag("--light-parts", o.lightParts,
                    "Also write direct light by itself and both parts' variances, for combining later");
   command.add_flag("--history", o.history, "Also write the variances after 1, 2, 4, ... samples, for combining later");
-  command.add_flag("--float", o.floatHeadline, "R G B as 32-bit floats");
-  command.add_option("--layer-prefix", o.layerPrefix, "Put before every layer's name, e.g. ViewLayer");
+  command.add_flag("--float", o.floatHeadline, "32-bit floats for R G B and the features too");
+  command.add_option("--layer-prefix", o.layerPrefix, "Put before every layer's name, e.g. ViewLayer")
+      ->type_name("NAME");
   command.add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
 }
 
@@ -129,25 +187,22 @@ WrittenImage writeImage(const ImageOutput& o, Estimates& estimates, const Plane<
     ExrOptions exr;
     exr.layers = layers.layers();
     exr.history = o.history;
-    exr.aovs = parseAovs(o.aovs);
+    exr.aovs = o.aovSet();
     exr.quarters = o.quarters;
     exr.lightParts = o.lightParts;
     exr.floatHeadline = o.floatHeadline;
     exr.layerPrefix = o.layerPrefix;
-    written.warnings = combineWarnings(combined);
+    written.warnings = combineWarnings(combined, o.combine.asked);
     // Beside each other: a PNG is compressed by one thread.
-    WriteReport report;
+    std::string warning;
     bothWhateverFails(
         [&] {
-          if (!o.exr.empty()) report = writeExr(o.exr, estimates, headline, alpha, exr);
+          if (!o.file.empty()) warning = writeImageFile(o.file, estimates, headline, alpha, exr, o.exposure);
         },
         [&] {
-          if (!o.png.empty()) writePng(o.png, headline, static_cast<float>(o.exposure));
+          if (!o.png.empty()) writePicture(o.png, ImageFormat::Png, headline, alpha, static_cast<float>(o.exposure));
         });
-    if (report.clampedToHalf > 0)
-      written.warnings.push_back(
-          fmt::format("{}: {} headline values above 65504 were clamped to fit half floats: use --float", o.exr,
-                      report.clampedToHalf));
+    if (!warning.empty()) written.warnings.push_back(std::move(warning));
     written.writeSeconds = writing.seconds();
   });
   for (const PipelineOutput& out : combined.outputs)

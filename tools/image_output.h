@@ -30,8 +30,8 @@ struct ImageViews {
 using ShowImages = std::function<void(const ImageViews&)>;
 
 struct ImageOutput {
-  std::string exr, png;  // empty: not written
-  std::string aovs = "all", layerPrefix;
+  std::string file, png;  // empty: not written; the ending says the format of `file`
+  std::string aovs, layerPrefix;
   double exposure = 0;
   bool quarters = false, history = false, lightParts = false, floatHeadline = false, noTiming = false;
   CombineChoice combine;
@@ -39,10 +39,24 @@ struct ImageOutput {
 
   // The names of the files, without empty ones.
   std::vector<std::string> files() const;
+  // What --aovs says; nothing said: features, or all where layers that are there only then have been asked for. Throws
+  // Error(Usage).
+  AovSet aovSet() const;
+  // Without files that can be written only once: streams.
+  ImageOutput replaceable() const;
+  // Without denoisers and combiners.
+  ImageOutput plain() const;
 };
 
-// -o, --png, --combine and all that say what the files hold.
+// -o, --png, --combine and all that say what the files hold; `output` holds the defaults.
 void addImageOptions(CLI::App& command, ImageOutput& output);
+
+// Throws Error for names of images whose endings are unknown, and for files that could not be written.
+void checkImageFiles(const ImageOutput& output);
+
+// One image in the format that the ending of `path` says. Returns a warning, or nothing.
+std::string writeImageFile(const std::string& path, const Estimates& estimates, const Rgb<float>& image,
+                           const Plane<float>* alpha, const ExrOptions& exr, double exposureStops);
 
 // What became of one writing.
 struct WrittenImage {

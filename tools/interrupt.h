@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// SIGINT and SIGTERM: the first asks the render to finish its pass and save, the second ends the process at once.
+// SIGINT, SIGTERM and SIGHUP: the first asks the render to finish its pass and save, the second ends the process at
+// once. A SIGHUP that is ignored already, as by nohup, stays ignored.
 #pragma once
 
 #include <atomic>

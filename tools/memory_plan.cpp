@@ -108,10 +108,11 @@ uint64_t parseBytes(const std::string& text) {
   if (suffix.ends_with("iB")) suffix.resize(suffix.size() - 2);
   const int power = suffix == "M" ? 20 : suffix == "G" ? 30 : suffix == "T" ? 40 : 0;
   if (error != std::errc() || power == 0 || !(number > 0) || number > 1e6)
-    throw Error(ExitCode::Usage, fmt::format("--memory-limit '{}': expected such as 512M, 4G or 1.5G", text));
+    throw Error(ExitCode::Usage,
+                fmt::format("'{}': expected a size such as 512M, 4G or 1.5G, at most 1e6 of them", text));
   const auto bytes = static_cast<uint64_t>(number * static_cast<double>(uint64_t(1) << power));
   if (bytes < kLeastLimit)
-    throw Error(ExitCode::Usage, fmt::format("--memory-limit {}: give at least {}", text, mebibytes(kLeastLimit)));
+    throw Error(ExitCode::Usage, fmt::format("'{}': expected at least {}", text, mebibytes(kLeastLimit)));
   return bytes;
 }
 

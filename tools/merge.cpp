@@ -7,11 +7,12 @@
 
 #include "combiners/registry.h"
 #include "renderer/core/error.h"
-#include "renderer/film/output_file.h"
 #include "renderer/film/state_file.h"
 #include "tools/cli.h"
+#include "tools/file_uses.h"
 #include "tools/header.h"
 #include "tools/image_output.h"
+#include "tools/option_checks.h"
 #include "tools/output_options.h"
 
 namespace braid {
@@ -90,15 +91,20 @@ void requireInputs(const Estimates& estimates, const CombineChoice& choice) {
 }
 
 int runMerge(const MergeOptions& o) {
-  parseAovs(o.image.aovs);
+  o.image.aovSet();
   for (const std::string& name : o.image.combine.wanted()) makeRecipe({}, {name}, {});  // unknown names first
   std::vector<std::string> outputs = o.image.files();
   if (!o.checkpoint.empty()) outputs.push_back(o.checkpoint);
   if (outputs.empty()) throw Error(ExitCode::Usage, "nothing to write: give -o OUT.exr, --png or --checkpoint");
-  for (const std::string& file : outputs) {
-    checkWritable(file);
-    removeAbandoned(file);
-  }
+  FileUses uses;
+  for (const std::string& part : o.parts) uses.input("a share", part);
+  uses.methods(o.image.combine.combine);
+  uses.output("--output", o.image.file);
+  uses.output("--png", o.image.png);
+  uses.output("--checkpoint", o.checkpoint);
+  uses.check();
+  checkImageFiles(o.image);
+  if (!o.checkpoint.empty()) prepareOutput(o.checkpoint);
 
   FilmState state = sumOf(sortedParts(o.parts, o.quiet));
   const std::vector<PassInterval> passes = state.estimates.front().passes;
@@ -136,10 +142,14 @@ void addMerge(CLI::App& app, Action& action) {
       "Examples:\n"
       "  braid merge part0.state part1.state part2.state -o out.exr\n"
       "  braid merge part*.state -o out.exr --combine auto --checkpoint all.state");
-  command->add_option("PART", o.parts, "States that `braid render --passes A:B --checkpoint PART` wrote")->required();
+  command->add_option("PART", o.parts, "States that `braid render --passes A:B --checkpoint PART` wrote")
+      ->required()
+      ->type_name("FILE");
+  o.image.aovs = "all";
   addImageOptions(*command, o.image);
-  command->add_option("--checkpoint", o.checkpoint, "Also write the sum as a state, to resume or merge on");
-  command->add_option("--threads", o.threads, "Worker threads (default: all)")->check(CLI::Range(0, 4096));
+  command->add_option("--checkpoint", o.checkpoint, "Also write the sum as a state, to resume or merge on")
+      ->type_name("FILE");
+  addThreads(*command, o.threads);
   command->add_flag("-q,--quiet", o.quiet, "Errors only");
   command->callback([options, &action] { action = [options] { return runMerge(*options); }; });
 }

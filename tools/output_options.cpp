@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "renderer/core/error.h"
+#include "renderer/film/output_file.h"
 
 namespace braid {
 
@@ -19,8 +20,11 @@ AovSet parseAovs(const std::string& name) {
   throw Error(ExitCode::Usage, "unknown --aovs '" + name + "': known are none, features, all");
 }
 
+const char* nameOf(AovSet set) { return set == AovSet::None ? "none" : set == AovSet::Features ? "features" : "all"; }
+
 void checkWritable(const std::string& path) {
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  if (isStream(path)) return;
+  const std::filesystem::path folder = std::filesystem::path(behindLinks(path)).parent_path();
   const std::string name = folder.empty() ? "." : folder.string();
   std::error_code ignored;
   if (!std::filesystem::is_directory(name, ignored))
@@ -31,6 +35,11 @@ void checkWritable(const std::string& path) {
                 fmt::format("{}: the folder {} is not writable: {}", path, name, std::strerror(errno)));
   if (std::filesystem::is_directory(path, ignored))
     throw Error(ExitCode::OutputFailed, fmt::format("{}: is a folder: give a file name", path));
+}
+
+void prepareOutput(const std::string& path) {
+  checkWritable(path);
+  removeAbandoned(path);
 }
 
 }  // namespace braid

@@ -10,11 +10,14 @@
 #include "integrators/registry.h"
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
+#include "renderer/film/output_file.h"
+#include "renderer/film/picture.h"
 #include "tools/cli.h"
 #include "tools/farm_job.h"
 #include "tools/image_output.h"
-#include "tools/memory_plan.h"
+#include "tools/option_checks.h"
 #include "tools/output_options.h"
+#include "tools/render_plan.h"
 
 namespace braid {
 
@@ -64,7 +67,7 @@ FarmJob farmJob(const PlanOptions& o, const Settings& planned) {
   job.program = o.program.empty() ? std::filesystem::read_symlink("/proc/self/exe").string() : o.program;
   job.folder = std::filesystem::current_path().string();
   job.scene = o.scene.file;
-  job.output = o.image.exr;
+  job.output = o.image.file;
   job.spp = planned.spp;
   job.tasks = o.tasks;
   job.threads = o.samples.threads;
@@ -79,7 +82,9 @@ FarmJob farmJob(const PlanOptions& o, const Settings& planned) {
   if (planned.lightParts) job.render.push_back({"--light-parts", std::nullopt});
   if (planned.history) job.render.push_back({"--history", std::nullopt});
   job.render.push_back({"--aovs", planned.features ? "features" : "none"});
-  carry(o.imageOptions, {"output"}, job.merge);
+  carry(o.imageOptions, {"output", "combine", "aovs"}, job.merge);
+  job.merge.push_back({"--combine", o.image.combine.combine});
+  job.merge.push_back({"--aovs", nameOf(o.image.aovSet())});
   if (!o.checkpoint.empty()) job.merge.push_back({"--checkpoint", o.checkpoint});
   if (o.scene.quiet) job.merge.push_back({"--quiet", std::nullopt});
   return job;
@@ -91,15 +96,18 @@ void checkJobOptions(const PlanOptions& o) {
   if (o.tasks == 0) refuse("--format: give --tasks, the number of shares");
   if (o.format.empty()) refuse("--tasks: give --format slurm, opencue, flamenco or make");
   if (o.json) refuse("--json and --tasks: a job is no JSON");
-  if (o.image.exr.empty()) refuse("--tasks: name the merged image with -o OUT.exr");
+  if (o.image.file.empty()) refuse("--tasks: name the merged image with -o OUT.exr");
+  if (o.image.file == kStandardOutput || o.image.png == kStandardOutput)
+    refuse("--tasks: standard output gets the job: give the merged image another name");
   if (!o.samples.time.empty()) refuse("--time: shares are made of passes, so give --spp alone");
   parseFarmFormat(o.format);
 }
 
-int runPlan(const PlanOptions& o) {
+int runPlan(PlanOptions o) {
   checkJobOptions(o);
+  if (!o.image.file.empty()) imageFormat(o.image.file);
   Settings settings = makeSettings(o.scene, o.samples);
-  settings.features = parseAovs(o.image.aovs) != AovSet::None;
+  settings.features = o.image.aovSet() != AovSet::None;
   settings.quarters = o.image.quarters;
   settings.history = o.image.history;
   settings.lightParts = o.image.lightParts;
@@ -109,18 +117,19 @@ int runPlan(const PlanOptions& o) {
   const CameraData camera = chooseCamera(data, o.scene);
   const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
   const auto integrators = makeIntegrators();
-  Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
-  const Recipe recipe = planCombining(o.image.combine, settings.spp, plan);
-  if (o.tasks > 0) {
-    requireRunnable(recipe, o.image.combine.wanted());
-    fmt::print("{}", farmJobText(farmJob(o, plan.settings), parseFarmFormat(o.format)));
+  const bool shares = o.tasks > 0;
+  const RenderPlan planned = planRender(*scene, camera, settings, pointersTo(integrators), o.image.combine,
+                                        {settings.spp, shares || !o.checkpoint.empty()});
+  if (shares) {
+    requireRunnable(planned.recipe, o.image.combine.wanted());
+    fmt::print("{}", farmJobText(farmJob(o, planned.plan.settings), parseFarmFormat(o.format)));
     return 0;
   }
-  const MemoryPlan memory = planMemory(*scene, plan, recipe, settings.spp);
   if (!o.json) {
-    fmt::print("{}{}{}", plan.text(), recipeText(recipe), memory.text());
+    fmt::print("{}", planned.text());
     return 0;
   }
+  const auto& [plan, recipe, memory, note] = planned;
   nlohmann::json lines = nlohmann::json::array();
   for (const PlanLine& line : plan.lines)
     lines.push_back({{"kept", line.kept}, {"subject", line.subject}, {"reason", line.reason}});
@@ -141,6 +150,8 @@ int runPlan(const PlanOptions& o) {
 void addPlan(CLI::App& app, Action& action) {
   auto options = std::make_shared<PlanOptions>();
   PlanOptions& o = *options;
+  o.samples.integrators = "auto";
+  combineByDefault(o.image.combine);
   CLI::App* command =
       app.add_subcommand("plan", "Print what a render would keep and leave out, and why; or a job for a farm");
   command->footer(
@@ -148,8 +159,8 @@ void addPlan(CLI::App& app, Action& action) {
       "that go on from their checkpoints when started again, and a merge that waits for them. It runs in the folder\n"
       "where it was printed, which all machines have to share.\n"
       "Examples:\n"
-      "  braid plan scene.glb --integrator auto\n"
-      "  braid plan scene.glb -o out.exr --spp 4096 --combine auto --tasks 16 --format slurm > job.sh\n"
+      "  braid plan scene.glb\n"
+      "  braid plan scene.glb -o out.exr --spp 4096 --tasks 16 --format slurm > job.sh\n"
       "      bash job.sh --partition=long --time=8:00:00       (options of sbatch)\n"
       "  braid plan scene.glb -o out.exr --spp 1024 --threads 4 --tasks 8 --format make > job.mk\n"
       "      make -j2 -f job.mk\n"
@@ -166,17 +177,25 @@ void addPlan(CLI::App& app, Action& action) {
   command->add_flag("--json", o.json, "As JSON");
   const char* group = "Job for a farm";
   command->add_option("--tasks", o.tasks, "Print a job of this many shares instead of the plan")
-      ->check(CLI::Range(uint64_t(1), uint64_t(100000)))
+      ->check(wholeNumber(1, 100000))
       ->group(group);
   command->add_option("--format", o.format, "The farm that the job is for: slurm, opencue, flamenco or make")
+      ->type_name("NAME")
       ->group(group);
   command->add_option("--program", o.program, "The braid that the machines run (default: this one, by its full path)")
+      ->type_name("FILE")
       ->group(group);
   command->add_option("--save-every", o.saveEvery, "How often shares save their checkpoints (default: as render)")
+      ->check(duration(true))
+      ->type_name("DURATION")
       ->group(group);
   command->add_option("--checkpoint", o.checkpoint, "Also write the merged sums as a state, to resume or merge on")
+      ->type_name("FILE")
       ->group(group);
-  command->callback([options, &action] { action = [options] { return runPlan(*options); }; });
+  command->callback([options, command, &action] {
+    noteWhoAsked(*command, options->image.combine);
+    action = [options] { return runPlan(*options); };
+  });
 }
 
 }  // namespace braid

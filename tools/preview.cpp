@@ -15,15 +15,16 @@
 #include "renderer/film/output_file.h"
 #include "tools/cli.h"
 #include "tools/combining.h"
+#include "tools/file_uses.h"
 #include "tools/header.h"
 #include "tools/interrupt.h"
-#include "tools/memory_plan.h"
-#include "tools/output_options.h"
+#include "tools/option_checks.h"
 #include "tools/preview_board.h"
 #include "tools/preview_feed.h"
 #include "tools/preview_server.h"
 #include "tools/progress_line.h"
 #include "tools/publisher.h"
+#include "tools/render_plan.h"
 #include "tools/scene_identity.h"
 #include "tools/tev_client.h"
 #include "version.h"
@@ -41,14 +42,13 @@ struct PreviewOptions {
   SampleChoice samples;
   ImageOutput image;
   std::string tev;
-  int port = -1;              // -1: none is asked for
-  bool combineGiven = false;  // else methods that cannot run are left out
+  int port = -1;  // -1: none is asked for
 };
 
 Settings previewSettings(const PreviewOptions& o) {
   Settings settings = makeSettings(o.scene, o.samples);
   if (o.samples.spp == 0 && o.samples.time.empty()) settings.spp = 0;  // until it is stopped
-  settings.features = parseAovs(o.image.aovs) != AovSet::None;
+  settings.features = o.image.aovSet() != AovSet::None;
   settings.quarters = o.image.quarters;
   settings.history = o.image.history;
   settings.lightParts = o.image.lightParts;
@@ -65,8 +65,9 @@ class Audience {
     if (!o.tev.empty()) tev_.emplace(o.tev);
     if (o.port < 0 && tev_) return;
     serve(o.port, [&stop] { stop = true; });
-    fmt::print("{}\n", server_->url());
-    std::fflush(stdout);
+    std::FILE* to = o.image.file == kStandardOutput || o.image.png == kStandardOutput ? stderr : stdout;
+    fmt::print(to, "{}\n", server_->url());
+    std::fflush(to);
   }
 
   PreviewBoard& board() { return board_; }
@@ -113,22 +114,6 @@ class Audience {
   std::optional<PreviewServer> server_;
 };
 
-// What combiners do, as far as they can with this scene and these settings.
-Recipe planPreview(Plan& plan, PreviewOptions& o, Audience& audience) {
-  Plan combining = plan;
-  const Recipe recipe = planCombining(o.image.combine, plan.settings.spp, combining);
-  try {
-    requireRunnable(recipe, o.image.combine.wanted());
-  } catch (const Error& e) {
-    if (o.combineGiven) throw;
-    audience.warn(fmt::format("nothing is combined: {}", e.what()));
-    o.image.combine.combine = "none";
-    return {};
-  }
-  plan = std::move(combining);
-  return recipe;
-}
-
 void tellSaved(const PreviewOptions& o, const RunReport& result, const WrittenImage& written,
                const std::string& reason) {
   if (o.scene.quiet) return;
@@ -150,12 +135,18 @@ WrittenImage save(const PreviewOptions& o, const Session& session, const RunRepo
   return writeImage(output, estimates, nullptr, o.samples.threads);
 }
 
+void checkOutputs(const PreviewOptions& o) {
+  FileUses uses;
+  uses.scene(o.scene.file, o.scene.environment);
+  uses.output("--output", o.image.file);
+  uses.output("--png", o.image.png);
+  uses.check();
+  checkImageFiles(o.image);
+}
+
 int runPreview(PreviewOptions o) {
   Settings settings = previewSettings(o);
-  for (const std::string& file : o.image.files()) {
-    checkWritable(file);
-    removeAbandoned(file);
-  }
+  checkOutputs(o);
   const std::atomic<bool>& interrupted = installInterruptHandler();
   std::atomic<bool> stop{false};
   Audience audience(o, stop);
@@ -167,16 +158,16 @@ int runPreview(PreviewOptions o) {
   const CameraData camera = chooseCamera(data, o.scene);
   const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
   const auto integrators = makeIntegrators();
-  Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
-  const Recipe recipe = planPreview(plan, o, audience);
-  const MemoryPlan memory = planMemory(*scene, plan, recipe, settings.spp);
-  requireWithinLimit(memory);
-  Session session(*scene, std::move(plan));
+  const RenderPlan plan =
+      planRender(*scene, camera, settings, pointersTo(integrators), o.image.combine, {settings.spp});
+  requireRunnable(plan.recipe, o.image.combine.wanted());
+  if (!plan.note.empty()) audience.warn(fmt::format("nothing is combined: {}", plan.note));
+  requireWithinLimit(plan.memory);
+  Session session(*scene, plan.plan);
   session.identify(BRAID_VERSION, BRAID_BUILD_FLAGS, sceneIdentity(o.scene, scene->data()),
                    planAttributes(*scene, session.plan(), scene->accel().isa()));
-  const std::string planText = session.plan().text() + recipeText(recipe) + memory.text();
-  if (o.scene.verbose) fmt::print(stderr, "{}", planText);
-  audience.board().setPlan(planText, o.image.combine.combine, static_cast<int>(session.plan().integrators.size()));
+  if (o.scene.verbose) fmt::print(stderr, "{}", plan.text());
+  audience.board().setPlan(plan.text(), o.image.combine.combine, static_cast<int>(session.plan().integrators.size()));
   audience.board().setPhase(PreviewPhase::Rendering);
 
   ProgressLine line(o.scene.quiet);
@@ -212,7 +203,8 @@ void addPreview(CLI::App& app, Action& action) {
   auto options = std::make_shared<PreviewOptions>();
   PreviewOptions& o = *options;
   o.scene.size = "640x360";
-  o.image.combine.combine = "auto";
+  o.samples.integrators = "auto";
+  combineByDefault(o.image.combine);
   CLI::App* command = app.add_subcommand("preview", "Watch a scene converge, in a browser or in tev");
   command->footer(
       "Without --spp and --time it goes on until it is stopped: by the button of the page, or by Ctrl-C.\n"
@@ -230,12 +222,13 @@ void addPreview(CLI::App& app, Action& action) {
                    fmt::format("Serve the page at this port of 127.0.0.1; 0: any that is free (default: {}, or any if "
                                "that is taken; with --tev none)",
                                kPort))
-      ->check(CLI::Range(0, 65535))
+      ->check(wholeNumber(0, 65535))
       ->type_name("PORT");
-  command->add_option("--tev", o.tev, "Show the images in tev, which listens there")->type_name("HOST:PORT");
-  const CLI::Option* combine = command->get_option("--combine");
-  command->callback([options, combine, &action] {
-    options->combineGiven = combine->count() > 0;
+  command->add_option("--tev", o.tev, "Show the images in tev, which listens there")
+      ->check(readBy(parseTevAddress))
+      ->type_name("HOST:PORT");
+  command->callback([options, command, &action] {
+    noteWhoAsked(*command, options->image.combine);
     action = [options] { return runPreview(*options); };
   });
 }

@@ -63,7 +63,7 @@ void ProgressLine::finish() {
   if (!quiet_ && terminal_) fmt::print(stderr, "\n");
 }
 
-JsonLog::JsonLog(const std::string& path) {
+JsonLog::JsonLog(const std::string& path) : path_(path) {
   if (path.empty()) return;
   file_ = path == "-" ? stdout : std::fopen(path.c_str(), "w");
   if (!file_)
@@ -72,6 +72,17 @@ JsonLog::JsonLog(const std::string& path) {
 
 JsonLog::~JsonLog() {
   if (file_ && file_ != stdout) std::fclose(file_);
+}
+
+void JsonLog::finish() {
+  if (!file_ || file_ == stdout) return;
+  const bool written = std::ferror(file_) == 0;
+  const bool closed = std::fclose(file_) == 0;
+  file_ = nullptr;
+  if (!written || !closed)
+    throw Error(ExitCode::OutputFailed, fmt::format("{}: the log could not be written: free some space, or write "
+                                                    "elsewhere",
+                                                    path_));
 }
 
 void JsonLog::write(const char* event, nlohmann::json record) {

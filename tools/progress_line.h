@@ -37,8 +37,12 @@ class JsonLog {
   JsonLog(const JsonLog&) = delete;
   JsonLog& operator=(const JsonLog&) = delete;
   void write(const char* event, nlohmann::json record);
+  // After the last record. Throws Error(OutputFailed) if any of them was not written; that of standard output is told
+  // at the end of the program.
+  void finish();
 
  private:
+  std::string path_;
   std::FILE* file_ = nullptr;
 };
 

@@ -13,6 +13,7 @@
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 #include "renderer/core/stopwatch.h"
+#include "renderer/film/output_file.h"
 #include "renderer/film/state_file.h"
 #include "tools/alarm.h"
 #include "tools/header.h"
@@ -31,14 +32,8 @@ int threadsOf(const PublishOptions& options) { return options.threads > 0 ? opti
 PublicationSchedule::Costs expectedCosts(const Session& session, const PublishOptions& options) {
   const Rgb<double>& pixels = session.state().estimates.front().sums.sums().front();
   const double share = static_cast<double>(pixels.size()) / threadsOf(options);
-  const double writing = !options.image.exr.empty() && options.image.aovs == "all" ? kWritingAll : kWritingFew;
+  const double writing = options.image.aovSet() == AovSet::All ? kWritingAll : kWritingFew;
   return {share * writing, share * (writing + kCombining)};
-}
-
-ImageOutput withoutCombining(ImageOutput output) {
-  output.combine.combine = "none";
-  output.combine.denoisers.clear();
-  return output;
 }
 
 // What compressing rows took stays with the allocator otherwise, beside what combining the next image takes.
@@ -140,7 +135,7 @@ void Publisher::publishImage(const Progress& p, bool combined, int threads) {
   cancel_ = false;
   machineShare_ = static_cast<double>(threads) / threadsOf(options_);
   pending_ = {samplesOf(session_.state()), p.seconds, combined, {}, {}};
-  const auto output = std::make_shared<ImageOutput>(combined ? options_.image : withoutCombining(options_.image));
+  const auto output = std::make_shared<ImageOutput>((combined ? options_.image : options_.image.plain()).replaceable());
   auto shown = std::make_shared<Estimates>(describedEstimates(session_, !options_.image.noTiming));
   const auto alpha = std::make_shared<std::optional<Plane<float>>>(session_.alpha());
   heldUp_ = clock.seconds();
@@ -205,7 +200,7 @@ std::vector<Publication> Publisher::round(const Progress& p) {
   }
   PublicationSchedule::Due due = schedule_.due(p);
   due.image = due.image && hasImage() && imageJob_.idle();
-  due.state = due.state && !options_.checkpoint.empty() && stateJob_.idle();
+  due.state = due.state && !options_.checkpoint.empty() && !isStream(options_.checkpoint) && stateJob_.idle();
   if (due.state) saveState(p, news);
   if (due.image) publishImage(p, due.combined, helpers_);
   schedule_.begun(due, p);
@@ -252,12 +247,12 @@ WrittenImage Publisher::writeLast(Estimates estimates, const std::optional<Plane
   // Without what may have been added for the combined file.
   estimates.attributes = attributes;
   estimates.estimates.resize(std::min(count, estimates.estimates.size()));
-  WrittenImage plain = writeImage(withoutCombining(options_.image), estimates, coverage, options_.threads);
+  WrittenImage plain = writeImage(options_.image.plain(), estimates, coverage, options_.threads);
   if (outOfMemory)
     throw Error(ExitCode::OutOfMemory,
                 "out of memory while combining; the image was saved without it: combine its file elsewhere (braid "
                 "combine), or lower --size");
-  plain.warnings.push_back(leftOut());
+  (options_.image.combine.asked ? plain.warnings : plain.timings).push_back(leftOut());
   return plain;
 }
 

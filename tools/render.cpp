@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // `braid render`: a glTF scene to a multilayer EXR, to a state that can be resumed, or to one machine's share of it.
-#include <charconv>
 #include <filesystem>
 
 #include <CLI/CLI.hpp>
@@ -13,14 +12,16 @@
 #include "renderer/film/state_file.h"
 #include "tools/cli.h"
 #include "tools/combining.h"
+#include "tools/file_uses.h"
 #include "tools/header.h"
 #include "tools/interrupt.h"
 #include "tools/keep_until_exit.h"
 #include "tools/late_first_pass.h"
-#include "tools/memory_plan.h"
+#include "tools/option_checks.h"
 #include "tools/output_options.h"
 #include "tools/progress_line.h"
 #include "tools/publisher.h"
+#include "tools/render_plan.h"
 #include "tools/run_clock.h"
 #include "tools/scene_identity.h"
 #include "tools/tev_client.h"
@@ -35,7 +36,7 @@ struct RenderOptions {
   SampleChoice samples;
   ImageOutput image;
   std::string logJson, checkpoint, resumeFile, passes, saveEvery = "60", tev;
-  bool resume = false, transparent = false;
+  bool resume = false, overwrite = false, transparent = false;
   double error = 0;
 
   // What the run leaves behind.
@@ -46,24 +47,9 @@ struct RenderOptions {
   }
 };
 
-// "A:B" with A < B.
-PassInterval parseInterval(const std::string& text) {
-  PassInterval i;
-  const char *begin = text.data(), *end = begin + text.size();
-  const auto first = std::from_chars(begin, end, i.begin);
-  bool ok = first.ec == std::errc() && first.ptr < end && *first.ptr == ':';
-  if (ok) {
-    const auto second = std::from_chars(first.ptr + 1, end, i.end);
-    ok = second.ec == std::errc() && second.ptr == end && i.begin < i.end && i.end <= kMaxPass;
-  }
-  if (!ok)
-    throw Error(ExitCode::Usage, "--passes '" + text + "': expected FIRST:END, passes from 0, END excluded, as 0:256");
-  return i;
-}
-
 Settings renderSettings(const RenderOptions& o) {
   Settings settings = makeSettings(o.scene, o.samples);
-  settings.features = parseAovs(o.image.aovs) != AovSet::None;
+  settings.features = o.image.aovSet() != AovSet::None;
   settings.quarters = o.image.quarters;
   settings.history = o.image.history;
   settings.lightParts = o.image.lightParts;
@@ -71,16 +57,40 @@ Settings renderSettings(const RenderOptions& o) {
   if (o.error > 0 && o.samples.spp == 0 && o.samples.time.empty()) settings.spp = 0;
   if (o.passes.empty()) return settings;
   if (o.samples.spp > 0) throw Error(ExitCode::Usage, "--spp and --passes: --passes alone says how many");
-  const PassInterval passes = parseInterval(o.passes);
+  const PassInterval passes = parsePasses(o.passes);
   settings.firstRound = passes.begin;
   settings.spp = passes.count();
   return settings;
 }
 
+// The file of the state to go on from; empty: there is none.
+std::string resumedFile(const RenderOptions& o) {
+  if (!o.resume) return "";
+  return o.resumeFile.empty() ? o.checkpoint : o.resumeFile;
+}
+
+// Hours of rendering are not replaced because an option was forgotten.
+void protectCheckpoint(const RenderOptions& o) {
+  std::error_code ignored;
+  if (o.overwrite || o.checkpoint.empty() || !std::filesystem::is_regular_file(o.checkpoint, ignored)) return;
+  if (o.resume && isSameFile(resumedFile(o), o.checkpoint)) return;
+  std::string held = "is there already, and is no state that this braid can read";
+  try {
+    const FilmState state = readStateHeader(o.checkpoint);
+    uint64_t samples = 0;
+    for (const PassInterval& i : state.estimates.front().passes) samples += i.count();
+    held = fmt::format("holds {} samples already", samples);
+  } catch (const Error&) {
+  }
+  throw Error(ExitCode::Usage,
+              fmt::format("--checkpoint {}: {}: give --resume to go on from it, or --overwrite to begin anew",
+                          o.checkpoint, held));
+}
+
 // The state to go on from, if there is one.
 std::optional<FilmState> earlierState(const RenderOptions& o, const Settings& settings) {
   if (!o.resume) return std::nullopt;
-  const std::string& file = o.resumeFile.empty() ? o.checkpoint : o.resumeFile;
+  const std::string file = resumedFile(o);
   if (file.empty()) throw Error(ExitCode::Usage, "--resume: name a file, here or with --checkpoint");
   // A job that is started again after a crash has the same command line as at first, when there was nothing to resume.
   if (o.resumeFile.empty() && !std::filesystem::exists(file)) return std::nullopt;
@@ -197,10 +207,20 @@ void checkOutputs(const RenderOptions& o) {
   if (o.files().empty()) throw Error(ExitCode::Usage, "nothing to write: give -o OUT.exr, --png or --checkpoint");
   if (o.error > 0 && o.image.files().empty())
     throw Error(ExitCode::Usage, "--error: there is no image to estimate it from: give -o OUT.exr");
-  for (const std::string& file : o.files()) {
-    checkWritable(file);
-    removeAbandoned(file);
-  }
+  FileUses uses;
+  uses.scene(o.scene.file, o.scene.environment);
+  for (const std::string* methods :
+       {&o.image.combine.combine, &o.image.combine.denoisers, &o.image.combine.biased, &o.image.combine.bases})
+    uses.methods(*methods);
+  if (!isSameFile(resumedFile(o), o.checkpoint)) uses.input("the state of --resume", resumedFile(o));
+  uses.output("--output", o.image.file);
+  uses.output("--png", o.image.png);
+  uses.output("--checkpoint", o.checkpoint);
+  uses.output("--log-json", o.logJson);
+  uses.check();
+  checkImageFiles(o.image);
+  if (!o.checkpoint.empty()) prepareOutput(o.checkpoint);
+  protectCheckpoint(o);
 }
 
 // What goes to the viewer of --tev with each publication, and what it says of it.
@@ -236,7 +256,7 @@ int exitCode(const RunReport& result, const RenderOptions& o, const WrittenImage
   return static_cast<int>(ExitCode::TargetNotReached);
 }
 
-int runRender(const RenderOptions& o) {
+int runRender(RenderOptions o) {
   Settings settings = renderSettings(o);
   checkOutputs(o);
   Viewer viewer(o);
@@ -251,20 +271,21 @@ int runRender(const RenderOptions& o) {
   const CameraData camera = chooseCamera(data, o.scene);
   std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
   const auto integrators = makeIntegrators();
-  Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
   // The passes of all machines will be combined, of which a share has few.
-  const Recipe recipe = planCombining(o.image.combine, settings.spp > 0 ? settings.spp + settings.firstRound : 0, plan);
-  if (!o.image.files().empty()) requireRunnable(recipe, o.image.combine.wanted());
-  const MemoryPlan memory = planMemory(*scene, plan, recipe, settings.spp);
-  requireWithinLimit(memory);
-  auto ownedSession = std::make_unique<Session>(*scene, std::move(plan));
+  const uint64_t samples = settings.spp > 0 ? settings.spp + settings.firstRound : 0;
+  RenderPlan plan = planRender(*scene, camera, settings, pointersTo(integrators), o.image.combine,
+                               {samples, !o.checkpoint.empty() || !o.passes.empty(), earlier.has_value()});
+  if (!o.image.files().empty()) requireRunnable(plan.recipe, o.image.combine.wanted());
+  requireWithinLimit(plan.memory);
+  auto ownedSession = std::make_unique<Session>(*scene, plan.plan);
   Session& session = *ownedSession;
   session.identify(BRAID_VERSION, BRAID_BUILD_FLAGS, sceneIdentity(o.scene, scene->data()),
                    planAttributes(*scene, session.plan(), scene->accel().isa()));
-  const std::string planText = session.plan().text() + recipeText(recipe) + memory.text();
-  if (o.scene.verbose) fmt::print(stderr, "{}", planText);
-  json.write("plan", {{"text", planText}, {"hash", hexString(session.plan().hash())}});
-  if (earlier) session.resume(std::move(*earlier), o.resumeFile.empty() ? o.checkpoint : o.resumeFile);
+  if (o.scene.verbose) fmt::print(stderr, "{}", plan.text());
+  if (!plan.note.empty() && !o.scene.quiet && !o.image.files().empty())
+    fmt::print(stderr, "note: nothing is combined: {}\n", plan.note);
+  json.write("plan", {{"text", plan.text()}, {"hash", hexString(session.plan().hash())}});
+  if (earlier) session.resume(std::move(*earlier), resumedFile(o));
   earlier.reset();
 
   ProgressLine line(o.scene.quiet);
@@ -293,6 +314,7 @@ int runRender(const RenderOptions& o) {
   const RunTimes parts = timesOf(times, scene->buildTimes(), began, ended, written);
   if (!o.scene.quiet) tellResult(result, o, parts, written);
   json.write("end", resultRecord(result, o, parts, *scene, written));
+  json.finish();
   keepUntilExit(std::move(ownedSession));
   keepUntilExit(std::move(scene));
   return exitCode(result, o, written);
@@ -303,14 +325,18 @@ int runRender(const RenderOptions& o) {
 void addRender(CLI::App& app, Action& action) {
   auto options = std::make_shared<RenderOptions>();
   RenderOptions& o = *options;
-  CLI::App* command = app.add_subcommand("render", "Render a scene to an EXR image");
+  o.samples.integrators = "auto";
+  combineByDefault(o.image.combine);
+  CLI::App* command = app.add_subcommand("render", "Render a scene to an image");
   command->footer(
       "Examples:\n"
       "  braid render scene.glb -o out.exr --spp 256\n"
+      "  braid render scene.glb -o out.png\n"
+      "  braid render scene.glb -o out.exr --integrator pt --combine none --aovs all\n"
       "  braid render scene.glb -o out.exr --time 2m --env sky.hdr --png out.png\n"
       "  braid render scene.glb -o out.exr --error 0.001 --time 1h\n"
       "  braid render scene.glb -o out.exr --spp 4096 --checkpoint run.state --resume\n"
-      "  braid render scene.glb -o out.exr --spp 4096 --combine auto --tev 127.0.0.1:14158\n"
+      "  braid render scene.glb -o out.exr --spp 4096 --tev 127.0.0.1:14158\n"
       "  braid render scene.glb --passes 256:512 --checkpoint part1.state    (then: braid merge)");
   addSceneOptions(*command, o.scene);
   addSampleOptions(*command, o.samples);
@@ -319,8 +345,9 @@ void addRender(CLI::App& app, Action& action) {
   command
       ->add_option("--error", o.error,
                    "Stop when the estimated relative error of the image (relL2 of `compare`) is at most this")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--checkpoint", o.checkpoint, "Keep all sums in this file, to resume or merge");
+      ->check(number(0, 1e9, Ends::LeastExcluded));
+  command->add_option("--checkpoint", o.checkpoint, "Keep all sums in this file, to resume or merge")
+      ->type_name("FILE");
   CLI::Option* resume =
       command
           ->add_option(
@@ -329,17 +356,26 @@ void addRender(CLI::App& app, Action& action) {
               "from that of --checkpoint, if it exists")
           ->expected(0, 1)
           ->type_name("FILE");
+  command->add_flag("--overwrite", o.overwrite, "Begin anew although the file of --checkpoint exists");
   command
       ->add_option("--save-every", o.saveEvery,
                    "While rendering, replace the outputs this often, besides after 1, 2, 4, ... samples; 0: only then")
-      ->capture_default_str();
-  command->add_option("--passes", o.passes,
-                      "Only the passes FIRST:END of every integrator: one machine's share, for `braid merge`");
+      ->capture_default_str()
+      ->check(duration(true))
+      ->type_name("DURATION");
+  command
+      ->add_option("--passes", o.passes,
+                   "Only these passes of every integrator: one machine's share, for `braid merge`")
+      ->check(readBy(parsePasses))
+      ->type_name("FIRST:END");
   command->add_option("--tev", o.tev, "Show what is published in tev, an image viewer that listens there")
+      ->check(readBy(parseTevAddress))
       ->type_name("HOST:PORT");
-  command->add_option("--log-json", o.logJson, "Progress and result as JSON lines, to a file or - for standard output");
-  command->callback([options, resume, &action] {
+  command->add_option("--log-json", o.logJson, "Progress and result as JSON lines, to a file or - for standard output")
+      ->type_name("FILE");
+  command->callback([options, resume, command, &action] {
     options->resume = resume->count() > 0;
+    noteWhoAsked(*command, options->image.combine);
     action = [options] { return runRender(*options); };
   });
 }

@@ -9,7 +9,12 @@
 #include "integrators/strategies.h"
 #include "renderer/core/error.h"
 #include "renderer/film/exr.h"
+#include "renderer/film/output_file.h"
+#include "renderer/film/picture.h"
 #include "tools/cli.h"
+#include "tools/file_uses.h"
+#include "tools/option_checks.h"
+#include "tools/output_options.h"
 
 namespace braid {
 
@@ -73,6 +78,7 @@ class PrintingStrategies final : public StrategyObserver {
 void writeStrategies(const TransportContext& context, const Plan& plan, const std::string& path) {
   const uint64_t passes = std::max<uint64_t>(plan.settings.spp, 1);
   const std::vector<StrategyImage> images = renderStrategies(context, plan, passes);
+  std::FILE* to = path == kStandardOutput ? stderr : stdout;
   Rgb<float> sum(plan.window.width(), plan.window.height());
   ExrOptions options;
   for (const StrategyImage& image : images) {
@@ -83,7 +89,7 @@ void writeStrategies(const TransportContext& context, const Plan& plan, const st
         sum[c][i] += image.mean[c][i];
         total += static_cast<double>(image.mean[c][i]);
       }
-    fmt::print("s={} t={}: mean {:.6g}\n", image.s, image.t, total / static_cast<double>(3 * sum.size()));
+    fmt::print(to, "s={} t={}: mean {:.6g}\n", image.s, image.t, total / static_cast<double>(3 * sum.size()));
   }
   Estimates estimates;
   estimates.width = sum.width();
@@ -92,21 +98,30 @@ void writeStrategies(const TransportContext& context, const Plan& plan, const st
   estimates.fullWidth = plan.settings.width;
   estimates.fullHeight = plan.settings.height;
   writeExr(path, estimates, sum, nullptr, options);
-  fmt::print("Saved: {}\n", path);
+  fmt::print(to, "Saved: {}\n", path);
+}
+
+void checkStrategies(const ReplayOptions& o) {
+  FileUses uses;
+  uses.scene(o.scene.file, o.scene.environment);
+  uses.output("--strategies", o.strategies);
+  uses.check();
+  if (imageFormat(o.strategies) != ImageFormat::Exr)
+    throw Error(ExitCode::Usage,
+                fmt::format("--strategies {}: only EXR has layers: name a file that ends in .exr", o.strategies));
+  prepareOutput(o.strategies);
 }
 
 int runReplay(const ReplayOptions& o) {
   const Settings settings = makeSettings(o.scene, o.samples);
   const bool bidirectional = settings.integrators.front() == "bdpt";
-  int x = 0, y = 0;
-  char rest = 0;
   if (o.strategies.empty() == o.pixel.empty() || (!o.strategies.empty() && !bidirectional))
     throw Error(ExitCode::Usage, "give --pixel X,Y, or --integrator bdpt --strategies FILE");
-  const bool valid = std::sscanf(o.pixel.c_str(), "%d,%d%c", &x, &y, &rest) == 2 && x >= 0 && y >= 0 &&
-                     x < settings.width && y < settings.height;
-  if (!o.pixel.empty() && !valid)
+  const auto [x, y] = o.pixel.empty() ? std::pair(0, 0) : parsePixel(o.pixel);
+  if (x >= settings.width || y >= settings.height)
     throw Error(ExitCode::Usage, fmt::format("--pixel '{}': expected X,Y inside the {}x{} frame", o.pixel,
                                              settings.width, settings.height));
+  if (!o.strategies.empty()) checkStrategies(o);
   SceneData data = loadScene(o.scene);
   const CameraData camera = chooseCamera(data, o.scene);
   const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
@@ -149,10 +164,16 @@ void addReplay(CLI::App& app, Action& action) {
       "--strategies ways.exr");
   addSceneOptions(*command, options->scene);
   addSampleOptions(*command, options->samples);
-  command->add_option("--pass", options->pass, "Index of the pass")->capture_default_str();
-  command->add_option("--pixel", options->pixel, "X,Y in the full frame");
-  command->add_option("--strategies", options->strategies,
-                      "EXR with the image of every way (s, t) of bdpt to find light, over --spp passes");
+  command->add_option("--pass", options->pass, "Index of the pass")
+      ->capture_default_str()
+      ->check(wholeNumber(0, kMaxPass));
+  command->add_option("--pixel", options->pixel, "Pixel of the full frame")
+      ->check(readBy(parsePixel))
+      ->type_name("X,Y");
+  command
+      ->add_option("--strategies", options->strategies,
+                   "EXR with the image of every way (s, t) of bdpt to find light, over --spp passes")
+      ->type_name("FILE");
   command->callback([options, &action] { action = [options] { return runReplay(*options); }; });
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <tuple>
 
@@ -14,6 +15,7 @@
 #include "renderer/core/error.h"
 #include "renderer/film/exr.h"
 #include "tools/cli.h"
+#include "tools/file_uses.h"
 #include "tools/interrupt.h"
 #include "tools/sweep_pipeline.h"
 #include "tools/sweep_progress.h"
@@ -43,10 +45,12 @@ bool readsFile(const std::string& method) {
   return false;
 }
 
+// The methods of a scene for which the plan keeps these integrators, joined by '+'.
+using MethodsOf = std::function<std::vector<SweepMethod>(const std::string& planned)>;
+
 class Sweep {
  public:
-  Sweep(const SweepOptions& options, const std::vector<SweepMethod>& methods,
-        const std::vector<const Integrator*>& integrators);
+  Sweep(const SweepOptions& options, MethodsOf methods, const std::vector<const Integrator*>& integrators);
   int run(std::ostream& out);
 
  private:
@@ -56,11 +60,12 @@ class Sweep {
   };
 
   void checkInputs() const;
+  void checkOutputs() const;
   void openFolder();
   std::vector<SweepJob> jobsOf(const std::string& scene) const;
   void expectWork();
   // False when interrupted.
-  bool runScene(size_t index, const std::vector<SweepJob>& jobs);
+  bool runScene(size_t index);
   std::string plannedIntegrators(const SweepScene& scene) const;
   bool findReference(SweepScene& scene);
   bool renderReference(SweepScene& scene, const std::string& integrator);
@@ -78,7 +83,8 @@ class Sweep {
   std::string path(const char* name) const { return o_.output + "/" + name; }
 
   const SweepOptions& o_;
-  std::vector<SweepMethod> methods_;
+  MethodsOf methodsOf_;
+  std::vector<SweepMethod> methods_;  // of the present scene
   std::vector<const Integrator*> integrators_;
   std::vector<std::string> names_;  // of the scenes
   std::vector<LadderRungs> ladders_;
@@ -92,10 +98,10 @@ class Sweep {
   const std::atomic<bool>& interrupted_;
 };
 
-Sweep::Sweep(const SweepOptions& options, const std::vector<SweepMethod>& methods,
-             const std::vector<const Integrator*>& integrators)
+Sweep::Sweep(const SweepOptions& options, MethodsOf methods, const std::vector<const Integrator*>& integrators)
     : o_(options),
-      methods_(methods),
+      methodsOf_(std::move(methods)),
+      methods_(methodsOf_("pt")),
       integrators_(integrators),
       names_(sceneNames(options.scenes)),
       progress_(options.quiet),
@@ -110,8 +116,8 @@ Sweep::Sweep(const SweepOptions& options, const std::vector<SweepMethod>& method
   measurement_.metrics = chooseMetrics(o_.metrics);
   measurement_.cropWorst = o_.cropWorst;
   const std::string spp = o_.spp.empty() && o_.time.empty() ? "4:256" : o_.spp;
-  if (!spp.empty()) ladders_.push_back({Ladder::Samples, parseLadder(spp, "--spp", false)});
-  if (!o_.time.empty()) ladders_.push_back({Ladder::Time, parseLadder(o_.time, "--time", true)});
+  if (!spp.empty()) ladders_.push_back({Ladder::Samples, parseLadder(spp, false)});
+  if (!o_.time.empty()) ladders_.push_back({Ladder::Time, parseLadder(o_.time, true)});
 }
 
 // Everything that can be known to fail hours later is found before the first render.
@@ -149,6 +155,26 @@ void Sweep::checkInputs() const {
                                             [&](const Integrator* i) { return i->name() == integrator; });
     if (!known) throw Error(ExitCode::Usage, fmt::format("--reference-integrator: no integrator '{}'", integrator));
   }
+}
+
+// What the sweep writes takes the place of no scene and no reference.
+void Sweep::checkOutputs() const {
+  FileUses uses;
+  for (const char* name : {"sweep.csv", "sweep.json", "summary.md", "report.html"}) uses.output("-o", path(name));
+  std::vector<std::string> inputs = o_.scenes;
+  for (const std::string& file : o_.scenes) uses.scene(file, "");
+  for (const std::string& name : names_)
+    if (const std::string file = valueForScene(o_.references, name, ""); !file.empty()) {
+      uses.input("a reference", file);
+      inputs.push_back(file);
+    }
+  uses.check();
+  for (const std::string& file : inputs)
+    for (const char* folder : {"images", "plots"})
+      if (isWithin(file, path(folder)))
+        throw Error(ExitCode::Usage,
+                    fmt::format("-o {}: the sweep writes into {}, where its input {} lies: choose another folder",
+                                o_.output, path(folder), file));
 }
 
 void Sweep::openFolder() {
@@ -357,7 +383,7 @@ void Sweep::warnAboutReference(const SweepScene& scene) {
                     scene.name, shortNumber(noise), shortNumber(least)));
 }
 
-bool Sweep::runScene(size_t index, const std::vector<SweepJob>& jobs) {
+bool Sweep::runScene(size_t index) {
   SceneChoice choice;
   choice.file = o_.scenes[index];
   choice.isa = o_.isa;
@@ -372,6 +398,8 @@ bool Sweep::runScene(size_t index, const std::vector<SweepJob>& jobs) {
   scene.camera = chooseCamera(data, choice);
   scene.scene = buildScene(std::move(data), choice, scene.camera);
   scene.planned = plannedIntegrators(scene);
+  methods_ = methodsOf_(scene.planned);
+  const std::vector<SweepJob> jobs = jobsOf(scene.name);
   if (!findReference(scene)) return false;
   recordScene(scene);
   warmUp(scene, jobs.front());
@@ -446,13 +474,12 @@ bool Sweep::reportFailures() const {
 
 int Sweep::run(std::ostream& out) {
   checkInputs();
+  checkOutputs();
   openFolder();
   expectWork();
   bool completed = true;
-  for (size_t i = 0; i < names_.size() && completed; ++i) {
-    const std::vector<SweepJob> jobs = jobsOf(names_[i]);
-    if (!jobs.empty()) completed = runScene(i, jobs);
-  }
+  for (size_t i = 0; i < names_.size() && completed; ++i)
+    if (!jobsOf(names_[i]).empty()) completed = runScene(i);
   finish(out);
   if (completed) return reportFailures() ? static_cast<int>(ExitCode::BadInput) : 0;
   fmt::print(stderr, "interrupted: the same command goes on where it stopped\n");
@@ -463,7 +490,9 @@ int Sweep::run(std::ostream& out) {
 
 int runSweep(const SweepOptions& options, const std::vector<SweepMethod>& methods,
              const std::vector<const Integrator*>& integrators, std::ostream& out) {
-  return Sweep(options, methods, integrators).run(out);
+  return Sweep(
+             options, [&](const std::string&) { return methods; }, integrators)
+      .run(out);
 }
 
 int runSweep(const SweepOptions& options, std::ostream& out) {
@@ -471,7 +500,10 @@ int runSweep(const SweepOptions& options, std::ostream& out) {
   const std::vector<const Integrator*> pointers = pointersTo(integrators);
   MethodOptions numbers;
   numbers.set("external-command-timeout", options.commandTimeout);
-  return runSweep(options, sweepMethods(options.methods, pointers, numbers), pointers, out);
+  const auto methods = [&](const std::string& planned) {
+    return sweepMethods(options.methods, pointers, numbers, planned);
+  };
+  return Sweep(options, methods, pointers).run(out);
 }
 
 }  // namespace braid

@@ -21,7 +21,7 @@ struct SweepOptions {
   std::string output;               // folder
   std::string preset;               // its name, empty: none; already applied
   std::string spp, time;            // ladders such as 4:1024 or 1:32; both empty: 4:256 samples
-  std::vector<std::string> methods{"pt"};
+  std::vector<std::string> methods{"pt", "auto/auto"};  // what renders make when nothing is said, and the plain image
   int seeds = 1;
   uint64_t seed = 0;  // of the first run; the others follow
   uint64_t referenceSpp = 4096;
@@ -36,8 +36,8 @@ struct SweepOptions {
 };
 
 // The rungs that "FROM:TO" (doubling), "A,B,C" or one number stand for, increasing. With `durations` items may have
-// units, as in 30s:4m. Throws Error(Usage) naming the option.
-std::vector<double> parseLadder(const std::string& text, const char* option, bool durations);
+// units, as in 30s:4m. Throws Error(Usage).
+std::vector<double> parseLadder(const std::string& text, bool durations);
 
 // Names for scenes from their files: the stem, with the folder's name before it where stems repeat, and only letters,
 // digits, '.', '_' and '-'.
@@ -49,7 +49,7 @@ std::string valueForScene(const std::vector<std::string>& list, const std::strin
 // Runs the sweep with every registered method; the summary goes to `out`. Returns the exit code: 0, 2 when a cell failed
 // or a method never ran, or 130 when interrupted, after writing everything that is known. Throws Error.
 int runSweep(const SweepOptions& options, std::ostream& out);
-// The same for these methods, which `options.methods` is not looked at for.
+// The same for these methods, which `options.methods` is not looked at for, with every scene.
 int runSweep(const SweepOptions& options, const std::vector<SweepMethod>& methods,
              const std::vector<const Integrator*>& integrators, std::ostream& out);
 

@@ -37,11 +37,12 @@ bool repeats(const std::vector<std::string>& names, const std::string& name) {
 
 }  // namespace
 
-std::vector<double> parseLadder(const std::string& text, const char* option, bool durations) {
+std::vector<double> parseLadder(const std::string& text, bool durations) {
   const auto fail = [&]() -> double {
-    throw Error(ExitCode::Usage,
-                fmt::format("{} '{}': expected FROM:TO (doubling from rung to rung) or a list such as {}", option, text,
-                            durations ? "1,4,16 in seconds" : "4,16,64"));
+    throw Error(
+        ExitCode::Usage,
+        fmt::format("'{}': expected FROM:TO (doubling from rung to rung) or a list such as {}", text,
+                    durations ? "1,4,16 in seconds, from above 0 to 1e9" : "4,16,64, whole numbers from 1 to 2^40"));
   };
   const auto number = [&](const std::string& item) {
     if (durations) {
@@ -51,7 +52,7 @@ std::vector<double> parseLadder(const std::string& text, const char* option, boo
     const bool whole = !item.empty() && item.size() < 16 &&
                        std::all_of(item.begin(), item.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
     const double v = whole ? std::stod(item) : 0;
-    return v > 0 ? v : fail();
+    return v > 0 && v <= 0x1p40 ? v : fail();
   };
   const std::vector<std::string> ends = splitAt(text, ':');
   std::vector<double> rungs;

@@ -163,13 +163,15 @@ Parsed parse(const std::string& name, const Integrators& integrators) {
 }  // namespace
 
 std::vector<SweepMethod> sweepMethods(const std::vector<std::string>& names, const Integrators& integrators,
-                                      const MethodOptions& numbers) {
+                                      const MethodOptions& numbers, const std::string& planned) {
+  const std::string automatic = "auto/";
   const std::vector<SweepMethod> plain = integratorMethods(integrators);
   std::vector<SweepMethod> known = plain;
   std::vector<std::shared_ptr<SharedPipeline>> pipelines;
   for (const std::string& name : names) {
     if (findIntegrator(integrators, name)) continue;
-    const Parsed parsed = parse(name, integrators);
+    const Parsed parsed =
+        parse(name.starts_with(automatic) ? planned + name.substr(automatic.size() - 1) : name, integrators);
     auto found =
         std::find_if(pipelines.begin(), pipelines.end(), [&](const auto& p) { return p->inputs() == parsed.inputs; });
     if (found == pipelines.end())

@@ -36,24 +36,6 @@ constexpr milliseconds kPatience(3000);    // for a viewer that takes no more by
 constexpr milliseconds kRetry(1000);       // between attempts to connect, and between looks whether it is still there
 constexpr milliseconds kPollInterval(50);  // how late the end of the render is noticed
 
-struct Address {
-  std::string host, port = "14158";
-};
-
-Address parseAddress(const std::string& text) {
-  Address a;
-  const size_t bracket = text.rfind(']'), colon = text.rfind(':');
-  const bool hasPort = colon != std::string::npos && (bracket == std::string::npos || bracket < colon);
-  a.host = text.substr(0, hasPort ? colon : std::string::npos);
-  if (hasPort) a.port = text.substr(colon + 1);
-  if (a.host.size() > 2 && a.host.front() == '[' && a.host.back() == ']') a.host = a.host.substr(1, a.host.size() - 2);
-  int port = 0;
-  const auto parsed = std::from_chars(a.port.data(), a.port.data() + a.port.size(), port);
-  if (a.host.empty() || parsed.ec != std::errc() || *parsed.ptr != '\0' || port < 1 || port > 65535)
-    throw Error(ExitCode::Usage, "--tev '" + text + "': expected HOST:PORT, such as 127.0.0.1:14158");
-  return a;
-}
-
 std::vector<PixelWindow> tilesOf(int width, int height) {
   std::vector<PixelWindow> tiles;
   for (int y = 0; y < height; y += kTile)
@@ -76,6 +58,21 @@ uint64_t hashOf(const std::string& bytes) {
 }
 
 }  // namespace
+
+TevAddress parseTevAddress(const std::string& text) {
+  TevAddress a;
+  const size_t bracket = text.rfind(']'), colon = text.rfind(':');
+  const bool hasPort = colon != std::string::npos && (bracket == std::string::npos || bracket < colon);
+  a.host = text.substr(0, hasPort ? colon : std::string::npos);
+  if (hasPort) a.port = text.substr(colon + 1);
+  if (a.host.size() > 2 && a.host.front() == '[' && a.host.back() == ']') a.host = a.host.substr(1, a.host.size() - 2);
+  int port = 0;
+  const auto parsed = std::from_chars(a.port.data(), a.port.data() + a.port.size(), port);
+  if (a.host.empty() || parsed.ec != std::errc() || *parsed.ptr != '\0' || port < 1 || port > 65535)
+    throw Error(ExitCode::Usage,
+                "'" + text + "': expected HOST:PORT such as 127.0.0.1:14158, the port from 1 to 65535");
+  return a;
+}
 
 // What the two threads share.
 struct TevClient::Mailbox {
@@ -244,7 +241,7 @@ class TevClient::Sender {
 };
 
 TevClient::TevClient(const std::string& address) : mailbox_(std::make_shared<Mailbox>()) {
-  thread_ = std::thread([box = mailbox_, to = parseAddress(address)] { Sender(box, to.host, to.port).run(); });
+  thread_ = std::thread([box = mailbox_, to = parseTevAddress(address)] { Sender(box, to.host, to.port).run(); });
 }
 
 TevClient::~TevClient() {

@@ -12,6 +12,12 @@
 
 namespace braid {
 
+struct TevAddress {
+  std::string host, port = "14158";
+};
+// Throws Error(Usage).
+TevAddress parseTevAddress(const std::string& text);
+
 class TevClient {
  public:
   // `address` is HOST:PORT or HOST, for tev's own port 14158. Throws Error(Usage) if it is neither.

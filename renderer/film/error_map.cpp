@@ -30,6 +30,8 @@ Plane<float> squaredBias(const Estimate& e) {
   return out;
 }
 
+bool knowsError(const Estimate& e) { return e.passes >= 2 && !e.variance.empty(); }
+
 Plane<float> errorMap(const Estimate& e) {
   Plane<float> out = squaredBias(e);
   if (e.variance.empty()) return out;

@@ -12,6 +12,9 @@ namespace braid {
 // squared bias of a caustic. Zero for estimates without a bias plane.
 Plane<float> squaredBias(const Estimate& estimate);
 
+// Whether there are passes and a variance to tell an error by.
+bool knowsError(const Estimate& estimate);
+
 // Estimated squared error of the mean, averaged over the channels: variance + squaredBias().
 Plane<float> errorMap(const Estimate& estimate);
 
