@@ -252,9 +252,16 @@ constexpr Field kVariants[] = {list("variants", kVariant)};
 constexpr Field kRootExtensions[] = {object("KHR_lights_punctual", kLights),
                                      object("KHR_materials_variants", kVariants)};
 
-constexpr Field kAsset[] = {{.name = "version", .kind = Kind::Text, .mend = "write \"2.0\"", .fallback = "\"2.0\""},
-                            text("minVersion")};
-constexpr Field kRoot[] = {object("asset", kAsset, "write {\"version\": \"2.0\"}", "{\"version\": \"2.0\"}"),
+constexpr const char* kReadAs2 = "it is read as 2.0";
+constexpr Field kAsset[] = {
+    {.name = "version", .kind = Kind::Text, .mend = "write \"2.0\"", .fallback = "\"2.0\"", .meanwhile = kReadAs2},
+    text("minVersion")};
+constexpr Field kRoot[] = {{.name = "asset",
+                            .kind = Kind::Object,
+                            .shape = kAsset,
+                            .mend = "write {\"version\": \"2.0\"}",
+                            .fallback = R"({"version": "2.0"})",
+                            .meanwhile = kReadAs2},
                            {.name = "extensionsUsed", .kind = Kind::Texts},
                            {.name = "extensionsRequired", .kind = Kind::Texts},
                            list("buffers", kBuffer),

@@ -206,7 +206,7 @@ class Validator {
       const std::string at = where + '/' + name;
       const uint64_t count = document_.accessor(accessor).count;
       bool readable = isUsable(accessor) && checkAttribute(name, accessor, at);
-      if (readable && count != vertices) {
+      if (readable && vertices > 0 && count != vertices) {
         report_.problem(at,
                         "accessor " + std::to_string(accessor) + " has " + counted(count, "element", "elements") +
                             ", but POSITION has " + std::to_string(vertices) + "; all attributes need the same count",
