@@ -65,11 +65,14 @@ void LightPaths::start(SubpathBatch& batch, uint64_t item) const {
 }
 
 void ConnectionQueue::flush() {
-  std::array<bool, kBatch> hidden;
-  scene_.accel().occluded(rays_, count_, hidden.data());
+  rays_.trace(count_);
   rayCount += static_cast<uint64_t>(count_);
-  for (int i = 0; i < count_; ++i)
-    if (!hidden[static_cast<size_t>(i)]) deliver_(entries_[static_cast<size_t>(i)]);
+  for (int i = 0; i < count_; ++i) {
+    if (rays_.hidden(i)) continue;
+    Entry& entry = entries_[static_cast<size_t>(i)];
+    rays_.attenuate(i, entry.value);
+    deliver_(entry);
+  }
   count_ = 0;
 }
 
@@ -89,7 +92,7 @@ BidirectionalKernel::BidirectionalKernel(const PassRequest& request, const Light
       mergeWeight_(merging ? merging->mergeWeight : 0.0),
       light_(request.context, lights.sampler, bidirectionalWalk(request.plan, Transport::Power, merging)),
       eye_(request.context, eyeSampler, bidirectionalWalk(request.plan, Transport::Radiance, merging)),
-      queue_(request.context.scene, [this](const ConnectionQueue::Entry& e) { deliver(e); }) {}
+      queue_(request.context, [this](const ConnectionQueue::Entry& e) { deliver(e); }) {}
 
 void BidirectionalKernel::render(const std::vector<std::pair<int, int>>& pixels) {
   pixels_ = &pixels;
@@ -140,13 +143,12 @@ void BidirectionalKernel::deliver(const ConnectionQueue::Entry& e) {
   if (observer_) observer_->onContribution(e.s, e.t, e.x, e.y, value);
 }
 
-bool BidirectionalKernel::storeLightVertex(int index, const SubpathVertex& vertex) {
+Onward BidirectionalKernel::storeLightVertex(int index, const SubpathVertex& vertex) {
   if (observer_) observer_->onVertex(vertex, Transport::Power);
-  if (vertex.woBelow) return false;
-  if (!vertex.bsdf.hasNonDelta()) return true;
+  if (vertex.woBelow || !vertex.bsdf.hasNonDelta()) return Onward::Scatter;
   stored_[static_cast<size_t>(index)].push_back(vertex);
   connectToCamera(vertex);
-  return true;
+  return Onward::Scatter;
 }
 
 void BidirectionalKernel::connectToCamera(const SubpathVertex& vertex) {
@@ -184,16 +186,16 @@ void BidirectionalKernel::connectToCamera(const SubpathVertex& vertex) {
   // From the camera, so that culled back faces let it pass as they do camera rays.
   const Vec3 end = offsetOrigin(vertex.hit, wi);
   const uint32_t salt = lights_.sampler.salt(vertex.key, 0x10000u + static_cast<uint32_t>(vertex.segments));
-  queue_.add(connectionRay(ray.origin, end, salt | kCameraRay),
+  queue_.add(connectionRay(ray.origin, end, salt | kCameraRay), mediumIndex(scene_, v.media),
              {value, vertex.segments + 1, 1, -1, static_cast<int>(raster.x), static_cast<int>(raster.y)});
 }
 
-bool BidirectionalKernel::shadeEyeVertex(int index, const SubpathState& state, const SubpathVertex& vertex) {
+Onward BidirectionalKernel::shadeEyeVertex(int index, const SubpathState& state, const SubpathVertex& vertex) {
   if (observer_) observer_->onVertex(vertex, Transport::Radiance);
   const MaterialSummary& material = context_.summaryOf(vertex.hit);
   if (material.unlit) {
     addUnlit(index, state, vertex);
-    return false;
+    return Onward::End;
   }
   if (material.emissive) addEmission(index, state, vertex);
   bool& featuresDone = featuresDone_[static_cast<size_t>(index)];
@@ -201,12 +203,12 @@ bool BidirectionalKernel::shadeEyeVertex(int index, const SubpathState& state, c
       plan_.features && !featuresDone &&
       recordFeatures(scene_, vertex, plan_.settings.maxDepth, sample_[static_cast<size_t>(index)].features);
   featuresDone = featuresDone || first;
-  if (vertex.segments >= plan_.settings.maxDepth) return false;
-  if (!vertex.bsdf.hasNonDelta()) return true;
+  if (vertex.segments >= plan_.settings.maxDepth) return Onward::Pass;
+  if (!vertex.bsdf.hasNonDelta()) return Onward::Scatter;
   sampleLight(index, vertex, first);
   connect(index, vertex);
   if (merging_) merge(index, vertex);
-  return true;
+  return Onward::Scatter;
 }
 
 // As in the path tracer: shown to the camera and to mirrors only.
@@ -238,7 +240,7 @@ void BidirectionalKernel::addEmission(int index, const SubpathState& state, cons
 
 void BidirectionalKernel::addEnvironment(int index, const SubpathState& state) {
   PathSample& sample = sample_[static_cast<size_t>(index)];
-  const bool fromCamera = state.segments == 1;
+  const bool fromCamera = state.fromCamera();
   if (fromCamera) sample.coverage = 0;
   Spectrum radiance(0);
   if (fromCamera && plan_.settings.background)
@@ -252,7 +254,7 @@ void BidirectionalKernel::addEnvironment(int index, const SubpathState& state) {
   }
   if ((fromCamera && plan_.settings.transparent) || isBlack(radiance)) return;
   double weight = 1;
-  if (!fromCamera) {
+  if (state.segments > 1) {
     const float direct = context_.lights.pdfEnvironment(state.direction);
     const float emit = lights_.emission.pdfEmit(context_.lights.environmentLight(), -state.direction, 1);
     weight = 1 / (1 + square(direct) * state.mis.vcm + square(emit) * state.mis.vc);
@@ -262,7 +264,7 @@ void BidirectionalKernel::addEnvironment(int index, const SubpathState& state) {
 
 void BidirectionalKernel::sampleLight(int index, const SubpathVertex& vertex, bool forFeatures) {
   const Hit& hit = vertex.hit;
-  const SampleBlock block = eyeSampler_.block(vertex.key, static_cast<unsigned>(vertex.segments));
+  const SampleBlock block = eyeSampler_.block(vertex.key, vertex.block);
   LightSample light;
   if (!context_.lights.sample(hit.position, vertex.receiverNormal(), vertex.twoSided, block.u[slot::kLightSelect],
                               {block.u[slot::kLightU], block.u[slot::kLightV]}, light))
@@ -274,6 +276,8 @@ void BidirectionalKernel::sampleLight(int index, const SubpathVertex& vertex, bo
     cosLight = std::abs(glm::dot(light.wi, scene_.emitters()[light.light].normal));
   else if (light.light < context_.lights.firstDirectional())
     directPdf *= sqr(light.distance);
+  // A surface that glows and transmits may pick a light in its own plane.
+  if (!(cosLight > 0)) return;
   const double wLight = light.delta ? 0.0 : square(v.pdfW / directPdf);  // (44)
   const float emit = lights_.emission.pdfEmit(light.light, -light.wi, cosLight);
   const double wCamera =  // (45)
@@ -285,7 +289,8 @@ void BidirectionalKernel::sampleLight(int index, const SubpathVertex& vertex, bo
                          mediaTransmittance(scene_, v.media, light.distance);
   if (isBlack(value)) return;
   const uint32_t salt = eyeSampler_.salt(vertex.key, 0x10000u + static_cast<uint32_t>(vertex.segments)) & ~kCameraRay;
-  queue_.add(shadowRay(hit, light.wi, light.distance, salt), {value, 1, vertex.segments + 1, index, 0, 0, forFeatures});
+  queue_.add(shadowRay(hit, light.wi, light.distance, salt), mediumIndex(scene_, v.media),
+             {value, 1, vertex.segments + 1, index, 0, 0, forFeatures});
 }
 
 void BidirectionalKernel::connect(int index, const SubpathVertex& eye) {
@@ -315,7 +320,7 @@ void BidirectionalKernel::connect(int index, const SubpathVertex& eye) {
     const float size = maxComponent(value);
     if (!(size > 0)) continue;
     total += size;
-    candidate_.push_back({k, value, size, wi, distance});
+    candidate_.push_back({k, value, size, wi, mediumIndex(scene_, e.media)});
   }
   for (const Candidate& c : candidate_) {
     const SubpathVertex& light = stored[c.vertex];
@@ -330,7 +335,8 @@ void BidirectionalKernel::connect(int index, const SubpathVertex& eye) {
     const Vec3 end = offsetOrigin(light.hit, -c.direction);
     const uint32_t salt = eyeSampler_.salt(
         eye.key, 0x20000u + static_cast<uint32_t>(eye.segments) * 64u + static_cast<uint32_t>(c.vertex));
-    queue_.add(connectionRay(origin, end, salt & ~kCameraRay), {value, light.segments + 1, eye.segments + 1, index});
+    queue_.add(connectionRay(origin, end, salt & ~kCameraRay), c.index,
+               {value, light.segments + 1, eye.segments + 1, index});
   }
 }
 

@@ -59,10 +59,11 @@ class ConnectionQueue {
     bool forFeatures = false;
   };
   using Deliver = std::function<void(const Entry&)>;
-  ConnectionQueue(const Scene& scene, Deliver deliver) : scene_(scene), deliver_(std::move(deliver)) {}
+  ConnectionQueue(const TransportContext& context, Deliver deliver) : deliver_(std::move(deliver)), rays_(context) {}
 
-  void add(const RayQuery& ray, const Entry& entry) {
-    rays_.set(count_, ray);
+  // `index`: of refraction, between the two ends.
+  void add(const RayQuery& ray, float index, const Entry& entry) {
+    rays_.set(count_, ray, index);
     entries_[static_cast<size_t>(count_)] = entry;
     if (++count_ == kBatch) flush();
   }
@@ -70,9 +71,8 @@ class ConnectionQueue {
   uint64_t rayCount = 0;
 
  private:
-  const Scene& scene_;
   Deliver deliver_;
-  ShadowBatch rays_;
+  VisibilityBatch rays_;
   std::array<Entry, kBatch> entries_;
   int count_ = 0;
 };
@@ -90,9 +90,9 @@ class BidirectionalKernel {
   uint64_t shadowRayCount() const { return queue_.rayCount; }
 
  private:
-  bool storeLightVertex(int index, const SubpathVertex& vertex);
+  Onward storeLightVertex(int index, const SubpathVertex& vertex);
   void connectToCamera(const SubpathVertex& vertex);
-  bool shadeEyeVertex(int index, const SubpathState& state, const SubpathVertex& vertex);
+  Onward shadeEyeVertex(int index, const SubpathState& state, const SubpathVertex& vertex);
   void addEmission(int index, const SubpathState& state, const SubpathVertex& vertex);
   void addEnvironment(int index, const SubpathState& state);
   void addUnlit(int index, const SubpathState& state, const SubpathVertex& vertex);
@@ -126,7 +126,7 @@ class BidirectionalKernel {
     Spectrum value;
     float size;
     Vec3 direction;
-    float distance;
+    float index;  // of refraction, between
   };
   std::vector<Candidate> candidate_;
 };

@@ -14,7 +14,7 @@ Camera::CameraRay cameraRayThrough(const Plan& plan, const SampleBlock& camera, 
 }
 
 bool recordFeatures(const Scene& scene, const SubpathVertex& vertex, int maxDepth, FeatureSample& features) {
-  if (!vertex.bsdf.hasNonDelta() && vertex.segments < maxDepth) return false;
+  if (!vertex.bsdf.hasNonDelta() && (vertex.segments < maxDepth || vertex.bsdf.passesStraight())) return false;
   const Hit& hit = vertex.hit;
   Spectrum albedo = vertex.bsdf.albedo();
   if (hit.material->emissive()) albedo += scene.emission(*hit.mesh, hit.triangle, hit.u, hit.v);

@@ -148,10 +148,10 @@ void GradientKernel::meetSurface(Walker& walker, PathSample& sample) {
   walker.rough = walker.path.media.empty() && roughSurface(walker.surface);
 }
 
-void GradientKernel::traceShadowRays(int count, bool* hidden) {
+void GradientKernel::traceShadowRays(int count, bool throughPanes) {
   if (record_)
     for (int k = 0; k < count; ++k) record_->push_back({shadowRays_.get(k), true});
-  scene_.accel().occluded(shadowRays_, count, hidden);
+  throughPanes ? shadowRays_.trace(count) : shadowRays_.traceOpaque(count);
   shadowRayCount += static_cast<uint64_t>(count);
 }
 
@@ -167,7 +167,7 @@ void GradientKernel::pair(GradientSample& result, int j, const Spectrum& base, c
 void GradientKernel::pairEmission(BasePath& base) {
   Walker& walker = base.walker;
   Vertex& vertex = base.vertex;
-  const bool fromCamera = walker.path.segments == 1;
+  const bool fromCamera = walker.path.fromCamera();
   const Spectrum found = walker.prefix * walker.emitted;
   (fromCamera ? base.result.direct : base.result.path.radiance) += found;
   vertex.emitted = fromCamera ? Spectrum(0) : found;
@@ -191,7 +191,6 @@ void GradientKernel::pairEmission(BasePath& base) {
       else if (walker.arrival == Arrival::Surface && context_.summaryOf(walker.hit).emissive)
         addEmission(path, walker.hit, found2);
       w.emitted = found2.radiance;
-      shift.state = Shift::Merged;
     } else if (shift.state == Shift::Merged) {
       w.emitted = walker.emitted;
       w.path.throughput = walker.path.throughput;
@@ -218,19 +217,17 @@ void GradientKernel::shadeBases() {
     if (base.vertex.arrival != Arrival::Surface) continue;
     ShadowRay& shadow = shadow_[static_cast<size_t>(count)];
     if (!shadeBase(base, shadow)) continue;
-    shadowRays_.set(count, shadow.ray);
+    shadowRays_.set(count, shadow.ray, shadow.index);
     shadowPath_[static_cast<size_t>(count++)] = static_cast<int>(&base - lanes_.data());
   }
-  std::array<bool, kBatch> hidden;
-  traceShadowRays(count, hidden.data());
+  traceShadowRays(count, true);
   for (int k = 0; k < count; ++k) {
     BasePath& base = lanes_[static_cast<size_t>(shadowPath_[static_cast<size_t>(k)])];
-    if (!hidden[static_cast<size_t>(k)]) {
-      if (shadow_[static_cast<size_t>(k)].forFeatures) base.result.path.features.visibility = 1;
-      continue;
-    }
-    base.vertex.light = Spectrum(0);
-    for (ShiftedPath& shift : base.shift) shift.light = Spectrum(0);
+    const bool hidden = shadowRays_.hidden(k);
+    if (!hidden && shadow_[static_cast<size_t>(k)].forFeatures) base.result.path.features.visibility = 1;
+    const auto see = [&](Spectrum& light) { hidden ? void(light = Spectrum(0)) : shadowRays_.attenuate(k, light); };
+    see(base.vertex.light);
+    for (ShiftedPath& shift : base.shift) see(shift.light);
   }
 }
 
@@ -242,19 +239,24 @@ bool GradientKernel::shadeBase(BasePath& base, ShadowRay& shadow) {
   vertex.hit = walker.hit;
   vertex.rough = walker.rough;
   vertex.nullCrossings = walker.path.nullCrossings;
+  vertex.panes = walker.path.panes;
   const Bsdf bsdf = bsdfOf(walker.surface, walker.hit);
   const bool first = wantFeatures_ && !walker.path.featuresDone;
   if (first) recordFeatures(walker.path, walker.hit, bsdf, base.result.path);
-  if (walker.path.segments >= plan_.settings.maxDepth) return false;
 
-  const SampleBlock block = sampler_.block(walker.path.key, static_cast<unsigned>(walker.path.segments));
+  const SampleBlock block = sampler_.block(walker.path.key, walker.path.block());
   const bool twoSided = transmits(walker.surface);
+  if (walker.path.segments >= plan_.settings.maxDepth) {
+    leaveBase(base, bsdf, twoSided, block);
+    return false;
+  }
   const bool lit = bsdf.hasNonDelta() && sampleLight(walker.path, walker.hit, bsdf, twoSided, block, shadow);
   bool hasShadow = lit;
   if (lit) vertex.light = walker.prefix * shadow.contribution;
   for (ShiftedPath& shift : base.shift) {
     Walker& w = shift.walker;
-    if (shift.state == Shift::Merged && lit) shift.light = w.prefix * shadow.contribution;
+    if ((shift.state == Shift::Merged || shift.state == Shift::Departing) && lit)
+      shift.light = w.prefix * shadow.contribution;
     if (shift.state != Shift::Connected) continue;
     ShadowRay seen;
     if (!sampleLight(w.path, w.hit, bsdfOf(w.surface, w.hit), twoSided, block, seen)) continue;
@@ -267,24 +269,32 @@ bool GradientKernel::shadeBase(BasePath& base, ShadowRay& shadow) {
   return hasShadow;
 }
 
+bool GradientKernel::goOn(PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided,
+                          const SampleBlock& block) const {
+  return path.segments < plan_.settings.maxDepth ? scatter(path, hit, bsdf, twoSided, block)
+                                                 : passPane(path, hit, bsdf.straightTransmittance());
+}
+
 void GradientKernel::leaveBase(BasePath& base, const Bsdf& bsdf, bool twoSided, const SampleBlock& block) {
   Walker& walker = base.walker;
   Vertex& vertex = base.vertex;
   const float etaScale = walker.path.etaScale;
-  if (!scatter(walker.path, walker.hit, bsdf, twoSided, block)) return;
+  // By the surfaces met, which shifts meet in step.
+  vertex.roulette = walker.path.block() >= kRouletteStart;
+  if (!goOn(walker.path, walker.hit, bsdf, twoSided, block)) return;
   if (isBlack(walker.prefix * walker.path.throughput)) return;
   vertex.survived = 1;
-  if (walker.path.segments >= kRouletteStart) {
+  if (vertex.roulette) {
     vertex.survived = survival(walker.path.throughput, walker.path.etaScale / etaScale);
     if (!(block.u[slot::kRoulette] < vertex.survived)) return;
     walker.path.throughput /= vertex.survived;
   }
-  vertex.roulette = walker.path.segments >= kRouletteStart;
   vertex.pdfW = walker.path.lastPdfW;
   vertex.goesOn = true;
-  ++walker.path.segments;
+  vertex.passed = walker.path.panes > vertex.panes;
   for (ShiftedPath& shift : base.shift)
-    if (shift.state == Shift::Connected || shift.state == Shift::Merged) leaveShared(base, shift);
+    if (shift.state == Shift::Connected || shift.state == Shift::Departing || shift.state == Shift::Merged)
+      leaveShared(base, shift);
 }
 
 void GradientKernel::advanceBases() {

@@ -21,6 +21,9 @@
 // they count every pair once (balance heuristic between the two directions). Where the shift does not exist it does
 // not exist from the other side either, and f_x counts with weight 1. For that the rule when to reconnect must give the
 // same answer from both sides: the shift fails where the shifted path alone could reconnect.
+//
+// A pane that a path passes is no vertex to its MIS weights and its length, but it is one to the shift mapping: base
+// path and shifts pass or meet surfaces in step, and never reconnect through a pane.
 #pragma once
 
 #include <vector>
@@ -41,7 +44,7 @@ struct GradientSample {
 
 class GradientKernel : PathKernel {
  public:
-  static constexpr int kRouletteStart = 5;  // segments from which base paths are ended at random
+  static constexpr unsigned kRouletteStart = 5;  // surface from which base paths are ended at random
 
   GradientKernel(const TransportContext& context, const Plan& plan, const PassSampler& sampler,
                  std::vector<RecordedRay>* record);
@@ -58,7 +61,8 @@ class GradientKernel : PathKernel {
   // What the last ray of a path met.
   enum class Arrival : uint8_t { Nothing, Sky, Unlit, Surface };
   // Connected: has just been joined to the base path's vertex, which it sees from elsewhere. Departing: leaves it in
-  // the base path's direction, with a density of its own. Merged: differs by its throughput only.
+  // the base path's direction, with a density of its own, and passes panes with it. Merged: differs by its throughput
+  // only.
   enum class Shift : uint8_t { Absent, Failed, Replay, Connected, Departing, Merged };
 
   // A path at a vertex. path.throughput is that since the vertex before, `prefix` that up to there.
@@ -92,10 +96,11 @@ class GradientKernel : PathKernel {
     Hit hit;
     Arrival arrival = Arrival::Nothing;
     bool rough = false;
-    int nullCrossings = 0;
+    int nullCrossings = 0, panes = 0;
     bool goesOn = false;
-    float pdfW = 0;      // of the direction of the next segment
-    float survived = 1;  // probability of surviving Russian roulette
+    bool passed = false;  // goes on straight through a pane
+    float pdfW = 0;       // of the direction of the next segment
+    float survived = 1;   // probability of surviving Russian roulette
     bool roulette = false;
   };
   struct BasePath {
@@ -114,6 +119,8 @@ class GradientKernel : PathKernel {
   void shadeBases();
   void pairEmission(BasePath& base);
   bool shadeBase(BasePath& base, ShadowRay& shadow);
+  // False: the path ends. At the greatest length of a path it goes on through a pane only.
+  bool goOn(PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const SampleBlock& block) const;
   void leaveBase(BasePath& base, const Bsdf& bsdf, bool twoSided, const SampleBlock& block);
   void leaveShared(BasePath& base, ShiftedPath& shift) const;
   void advanceBases();
@@ -128,7 +135,7 @@ class GradientKernel : PathKernel {
   static float survival(const Spectrum& weight, float etaRatio);
   static bool transmits(const SurfaceParameters& s);
   static Bsdf bsdfOf(const SurfaceParameters& s, const Hit& hit);
-  void traceShadowRays(int count, bool* hidden);
+  void traceShadowRays(int count, bool throughPanes);
   static void pairLight(BasePath& base);
   static void pair(GradientSample& result, int j, const Spectrum& base, const Spectrum& shifted, float jacobian,
                    bool failed);

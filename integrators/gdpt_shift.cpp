@@ -19,7 +19,12 @@ bool usable(float jacobian) { return jacobian < kMaxJacobian && jacobian > 1 / k
 void GradientKernel::leaveShared(BasePath& base, ShiftedPath& shift) const {
   const Walker& walker = base.walker;
   Walker& w = shift.walker;
-  if (shift.state == Shift::Merged) {
+  if (shift.state != Shift::Connected) {
+    // Through a pane the density with which it departed still matters for the light that it will find.
+    if (base.vertex.passed)
+      w.path.throughput = walker.path.throughput;
+    else
+      shift.state = Shift::Merged;
     if (isBlack(w.prefix * walker.path.throughput)) shift.state = Shift::Failed;
     return;
   }
@@ -64,19 +69,20 @@ void GradientKernel::advanceShifts(int j) {
     ShadowRay shadow;
     bool connects = false;
     if (shadeShift(*base, j, shadow, connection[static_cast<size_t>(connections)], connects)) {
-      shadowRays_.set(shadows, shadow.ray);
+      shadowRays_.set(shadows, shadow.ray, shadow.index);
       lit[static_cast<size_t>(shadows++)] = &base->shift[j];
     }
     if (connects) connecting[static_cast<size_t>(connections++)] = &base->shift[j];
   }
-  std::array<bool, kBatch> hidden;
-  traceShadowRays(shadows, hidden.data());
-  for (int k = 0; k < shadows; ++k)
-    if (hidden[static_cast<size_t>(k)]) lit[static_cast<size_t>(k)]->light = Spectrum(0);
-  for (int k = 0; k < connections; ++k) shadowRays_.set(k, connection[static_cast<size_t>(k)]);
-  traceShadowRays(connections, hidden.data());
+  traceShadowRays(shadows, true);
+  for (int k = 0; k < shadows; ++k) {
+    Spectrum& light = lit[static_cast<size_t>(k)]->light;
+    shadowRays_.hidden(k) ? void(light = Spectrum(0)) : shadowRays_.attenuate(k, light);
+  }
+  for (int k = 0; k < connections; ++k) shadowRays_.set(k, connection[static_cast<size_t>(k)], 1);
+  traceShadowRays(connections, false);
   for (int k = 0; k < connections; ++k)
-    connecting[static_cast<size_t>(k)]->state = hidden[static_cast<size_t>(k)] ? Shift::Failed : Shift::Connected;
+    connecting[static_cast<size_t>(k)]->state = shadowRays_.hidden(k) ? Shift::Failed : Shift::Connected;
 }
 
 // One vertex of a replaying shift. True: a shadow ray is to be traced; `connects`: the connection to the base path's
@@ -92,22 +98,23 @@ bool GradientKernel::shadeShift(BasePath& base, int j, ShadowRay& shadow, RayQue
     shift.lightFailed = true;
     return false;
   }
-  if (w.path.segments > 1) pair(base.result, j, vertex.emitted, w.prefix * w.emitted, shift.jacobian, false);
+  if (!w.path.fromCamera()) pair(base.result, j, vertex.emitted, w.prefix * w.emitted, shift.jacobian, false);
   w.fold();
   if (vertex.arrival != Arrival::Surface || w.arrival != Arrival::Surface) {
     shift.state = Shift::Failed;
     shift.lightFailed = true;
     return false;
   }
-  if (w.path.segments >= plan_.settings.maxDepth) return false;
 
   const Bsdf bsdf = bsdfOf(w.surface, w.hit);
-  const SampleBlock block = sampler_.block(w.path.key, static_cast<unsigned>(w.path.segments));
+  const SampleBlock block = sampler_.block(w.path.key, w.path.block());
   const bool twoSided = transmits(w.surface);
-  const bool lit = bsdf.hasNonDelta() && sampleLight(w.path, w.hit, bsdf, twoSided, block, shadow);
+  const bool lit = w.path.segments < plan_.settings.maxDepth && bsdf.hasNonDelta() &&
+                   sampleLight(w.path, w.hit, bsdf, twoSided, block, shadow);
   if (lit) shift.light = w.prefix * shadow.contribution;
   if (!vertex.goesOn) return lit;
-  shift.canReconnect = vertex.rough && w.rough && vertex.nullCrossings == w.path.nullCrossings;
+  shift.canReconnect = vertex.rough && w.rough && vertex.nullCrossings == w.path.nullCrossings &&
+                       vertex.panes == w.path.panes;  // as long as the base path
   if (shift.canReconnect && base.walker.reconnectable())
     connects = connect(base, shift, bsdf, connection);
   else if (replay(vertex, shift, bsdf, twoSided, block))
@@ -120,10 +127,7 @@ bool GradientKernel::replay(const Vertex& vertex, ShiftedPath& shift, const Bsdf
                             const SampleBlock& block) const {
   Walker& w = shift.walker;
   const float etaScale = w.path.etaScale;
-  if (!scatter(w.path, w.hit, bsdf, twoSided, block)) return false;
-  if (!takeRoulette(vertex, w.path.etaScale / etaScale, shift)) return false;
-  ++w.path.segments;
-  return true;
+  return goOn(w.path, w.hit, bsdf, twoSided, block) && takeRoulette(vertex, w.path.etaScale / etaScale, shift);
 }
 
 // Turns a shift to the base path's next vertex. False: it cannot see or light it; else `ray` decides.

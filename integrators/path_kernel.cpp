@@ -26,7 +26,7 @@ void PathKernel::add(const Spectrum& radiance, bool direct, PathSample& sample) 
 }
 
 void PathKernel::addEnvironment(const PathState& path, PathSample& sample) const {
-  const bool fromCamera = path.segments == 1;
+  const bool fromCamera = path.fromCamera();
   if (fromCamera) sample.coverage = 0;
   Spectrum radiance(0);
   if (fromCamera && plan_.settings.background) {
@@ -77,6 +77,15 @@ bool PathKernel::crossNullInterface(PathState& path, const Hit& hit) const {
   return true;
 }
 
+// Straight on through a pane: MIS weights, the part of the light and the length of the path stay those of the last
+// vertex. False: nothing gets through.
+bool PathKernel::passPane(PathState& path, const Hit& hit, const Spectrum& weight) const {
+  path.throughput *= weight;
+  if (isBlack(path.throughput)) return false;
+  path.origin = offsetOrigin(hit, path.direction);
+  return ++path.panes < kMostPanes;
+}
+
 // What an unlit surface shows, it shows to the camera and to mirrors only: it lights nothing (KHR_materials_unlit).
 void PathKernel::addUnlit(PathState& path, const Hit& hit, PathSample& sample) const {
   const Spectrum color = baseColorAt(scene_, hit);
@@ -90,7 +99,7 @@ void PathKernel::addUnlit(PathState& path, const Hit& hit, PathSample& sample) c
 
 void PathKernel::recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsdf, PathSample& sample) const {
   path.featureDistance += hit.distance;
-  if (!bsdf.hasNonDelta() && path.segments < plan_.settings.maxDepth) return;
+  if (!bsdf.hasNonDelta() && (path.segments < plan_.settings.maxDepth || bsdf.passesStraight())) return;
   path.featuresDone = true;
   Spectrum albedo = bsdf.albedo();
   if (hit.material->emissive()) albedo += scene_.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
@@ -116,10 +125,12 @@ bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Bsdf& 
   shadow.contribution = path.throughput * value.f * light.radiance * (weight / light.pdfW);
   setShadowRay(hit, light.wi, light.distance, mix32(path.salt ^ 0x51ed270bu) & ~kCameraRay, shadow.ray);
   const bool volume = context_.summaryOf(hit).volume;
+  shadow.index = 1;
   if (!path.media.empty() || volume) {
     MediaStack media = path.media;
     if (!reflects && volume) media.cross(hit.mesh->material, hit.front);
     shadow.contribution *= mediaTransmittance(scene_, media, light.distance);
+    shadow.index = mediumIndex(scene_, media);
   }
   return true;
 }
@@ -129,6 +140,18 @@ bool PathKernel::scatter(PathState& path, const Hit& hit, const Bsdf& bsdf, bool
                          const SampleBlock& block) const {
   BsdfSample sample;
   if (!bsdf.sample(block.u[slot::kLobe], {block.u[slot::kBsdfU], block.u[slot::kBsdfV]}, sample)) return false;
+  if (!(sample.straight ? passPane(path, hit, sample.weight) : turn(path, hit, bsdf, twoSided, sample))) return false;
+  const float survival = roulette_.survival(path.segments, maxComponent(path.throughput) / path.etaScale);
+  if (survival < 1) {
+    if (!(block.u[slot::kRoulette] < survival)) return false;
+    path.throughput /= survival;
+  }
+  if (!sample.straight) ++path.segments;
+  return true;
+}
+
+bool PathKernel::turn(PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided,
+                      const BsdfSample& sample) const {
   const Vec3 direction = renormalize(hit.frame.toWorld(sample.wi));
   const bool reflects = glm::dot(direction, hit.ng) > 0;
   if (reflects == sample.transmitted) return false;
@@ -143,12 +166,7 @@ bool PathKernel::scatter(PathState& path, const Hit& hit, const Bsdf& bsdf, bool
   path.lastTwoSided = twoSided;
   path.lastPdfW = sample.pdfW;
   path.lightCouldNotBeSampled = sample.delta;
-
-  const float survival = roulette_.survival(path.segments, maxComponent(path.throughput) / path.etaScale);
-  if (survival < 1) {
-    if (!(block.u[slot::kRoulette] < survival)) return false;
-    path.throughput /= survival;
-  }
+  if (path.bounces > 0 || bsdf.hasNonDelta()) ++path.bounces;
   return true;
 }
 
@@ -185,8 +203,8 @@ void PathKernel::run() {
 
 void PathKernel::queueRay(int slot, PathState& path) {
   if (filtered_) {
-    const uint32_t salt = sampler_.salt(path.key, static_cast<uint32_t>(path.segments + path.nullCrossings));
-    path.salt = (salt & ~kCameraRay) | (path.segments == 1 ? kCameraRay : 0);
+    const uint32_t salt = sampler_.salt(path.key, path.block() + static_cast<uint32_t>(path.nullCrossings));
+    path.salt = (salt & ~kCameraRay) | (path.fromCamera() ? kCameraRay : 0);
   }
   rays_.set(slot, {path.origin, path.direction, kInfinity, path.salt});
   if (observer_) observer_->onRay(path);
@@ -225,7 +243,7 @@ void PathKernel::prepareShading() {
     if (!(query_[i].t < kInfinity)) continue;
     const PathState& path = path_[static_cast<size_t>(active_[i])];
     makeHit(scene_, query_[i], path.direction, hit_[i]);
-    block_[i] = sampler_.block(path.key, static_cast<unsigned>(path.segments));
+    block_[i] = sampler_.block(path.key, path.block());
   }
 }
 
@@ -245,7 +263,8 @@ void PathKernel::shadeActive() {
     const bool goesOn =
         shade(path_[i], hit_[ray], block_[ray], sample_[i], shadow_[static_cast<size_t>(shadowCount_)], hasShadow);
     if (hasShadow) {
-      shadowRays_.set(shadowCount_, shadow_[static_cast<size_t>(shadowCount_)].ray);
+      const ShadowRay& shadow = shadow_[static_cast<size_t>(shadowCount_)];
+      shadowRays_.set(shadowCount_, shadow.ray, shadow.index);
       shadowPath_[static_cast<size_t>(shadowCount_++)] = p;
     }
     if (!goesOn) continue;
@@ -258,12 +277,13 @@ void PathKernel::shadeActive() {
 void PathKernel::traceShadows() {
   if (record_)
     for (int k = 0; k < shadowCount_; ++k) record_->push_back({shadowRays_.get(k), true});
-  std::array<bool, kBatch> hidden;
-  scene_.accel().occluded(shadowRays_, shadowCount_, hidden.data());
+  shadowRays_.trace(shadowCount_);
   for (int k = 0; k < shadowCount_; ++k) {
-    const ShadowRay& shadow = shadow_[static_cast<size_t>(k)];
-    if (observer_) observer_->onLight(shadow, !hidden[static_cast<size_t>(k)]);
-    if (hidden[static_cast<size_t>(k)]) continue;
+    ShadowRay& shadow = shadow_[static_cast<size_t>(k)];
+    const bool hidden = shadowRays_.hidden(k);
+    if (!hidden) shadowRays_.attenuate(k, shadow.contribution);
+    if (observer_) observer_->onLight(shadow, !hidden);
+    if (hidden) continue;
     PathSample& sample = sample_[static_cast<size_t>(shadowPath_[static_cast<size_t>(k)])];
     add(shadow.contribution, shadow.direct, sample);
     if (shadow.forFeatures) sample.features.visibility = 1;
@@ -291,7 +311,7 @@ bool PathKernel::shade(PathState& path, const Hit& hit, const SampleBlock& block
                         : Bsdf(surfaceAt(scene_, hit, lobes, indexOutside(scene_, path.media, hit)), wo);
   const bool firstNonSpecular = wantFeatures_ && !path.featuresDone;
   if (firstNonSpecular) recordFeatures(path, hit, bsdf, sample);
-  if (path.segments >= plan_.settings.maxDepth) return false;
+  if (path.segments >= plan_.settings.maxDepth) return passPane(path, hit, bsdf.straightTransmittance());
 
   const bool twoSided = (lobes & (kLobeTransmission | kLobeDiffuseTransmission)) != 0;
   if (bsdf.hasNonDelta()) {
@@ -299,10 +319,7 @@ bool PathKernel::shade(PathState& path, const Hit& hit, const SampleBlock& block
     shadow.forFeatures = firstNonSpecular && path.featuresDone;
     shadow.direct = path.bounces == 0;
   }
-  if (path.bounces > 0 || bsdf.hasNonDelta()) ++path.bounces;
-  if (!scatter(path, hit, bsdf, twoSided, block)) return false;
-  ++path.segments;
-  return true;
+  return scatter(path, hit, bsdf, twoSided, block);
 }
 
 }  // namespace braid

@@ -4,12 +4,13 @@
 //   throughput · emission,   throughput = Π f(wo, wi) |cos| / pdf(wi),
 //
 // where the light at each vertex is found in two ways, by sampling a light and by the BSDF direction hitting one,
-// weighted by the power heuristic (Veach 1997). Other integrators follow the same conventions for hits, media, null
-// interfaces and termination.
+// weighted by the power heuristic (Veach 1997). Both ways pass panes (visibility.h), which are no vertices. Other
+// integrators follow the same conventions for hits, media, null interfaces, panes and termination.
 #pragma once
 
 #include "integrators/path_state.h"
 #include "renderer/session/integrator.h"
+#include "renderer/transport/visibility.h"
 
 namespace braid {
 
@@ -24,6 +25,7 @@ struct PathSample {
 // Light found at a vertex, not yet known to be visible.
 struct ShadowRay {
   RayQuery ray;
+  float index;            // of refraction, where it runs
   Spectrum contribution;  // to the path's radiance if nothing lies between
   bool forFeatures;       // also the visibility feature
   bool direct;            // of the first non-specular vertex
@@ -54,7 +56,8 @@ class PathKernel {
         roulette_(roulette),
         wantFeatures_(plan.features),
         filtered_(context.scene.accel().filtered()),
-        cameraMedia_(mediaOfCamera(context.scene, plan.camera)) {}
+        cameraMedia_(mediaOfCamera(context.scene, plan.camera)),
+        shadowRays_(context) {}
 
   // Starts a path through pixel (x, y) of the full frame with the random numbers of `key`. At most kBatch before a
   // run().
@@ -83,9 +86,11 @@ class PathKernel {
   void addUnlit(PathState& path, const Hit& hit, PathSample& sample) const;
   void add(const Spectrum& radiance, bool direct, PathSample& sample) const;
   bool crossNullInterface(PathState& path, const Hit& hit) const;
+  bool passPane(PathState& path, const Hit& hit, const Spectrum& weight) const;
   bool sampleLight(const PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const SampleBlock& block,
                    ShadowRay& shadow) const;
   bool scatter(PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const SampleBlock& block) const;
+  bool turn(PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const BsdfSample& sample) const;
   void recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsdf, PathSample& sample) const;
 
   const TransportContext& context_;
@@ -107,7 +112,7 @@ class PathKernel {
   std::array<SampleBlock, kBatch> block_;
   std::array<int, kBatch> active_;  // indices of the paths that go on
   int activeCount_ = 0;
-  ShadowBatch shadowRays_;
+  VisibilityBatch shadowRays_;
   std::array<ShadowRay, kBatch> shadow_;
   std::array<int, kBatch> shadowPath_;
   int shadowCount_ = 0;

@@ -15,6 +15,7 @@ struct PathState {
   MediaStack media;
   int segments = 0;       // traced so far, null interfaces not counted
   int nullCrossings = 0;  // bounds a path through degenerate nested surfaces
+  int panes = 0;          // passed straight; they are no vertices
   uint32_t salt = 0;      // of stochastic coverage, one per ray
   uint64_t key = 0;       // of the path's random numbers
 
@@ -28,6 +29,11 @@ struct PathState {
   int bounces = 0;            // scattered at the first non-specular vertex and since; up to 1 of them, light is direct
   bool featuresDone = false;  // the first non-specular vertex is behind
   float featureDistance = 0;  // metres travelled up to it
+
+  // Of the random numbers at the surface ahead.
+  unsigned block() const { return static_cast<unsigned>(segments + panes); }
+  // Nothing but null interfaces has been met.
+  bool fromCamera() const { return segments == 1 && panes == 0; }
 };
 
 }  // namespace braid

@@ -32,7 +32,8 @@ PhotonEyeBatch::PhotonEyeBatch(const TransportContext& context, const Plan& plan
       cameraMedia_(cameraMedia),
       caustics_(caustics),
       lightsCanBeHit_(!context.scene.emitters().empty() || context.scene.environment()),
-      walks_(context, sampler, eyeSettings(plan, caustics)) {}
+      walks_(context, sampler, eyeSettings(plan, caustics)),
+      shadowRays_(context) {}
 
 void PhotonEyeBatch::clear() {
   walks_.clear();
@@ -59,16 +60,15 @@ PhotonEyeBatch::Step PhotonEyeBatch::shade(int index, SubpathState& state, Subpa
     return {};
   }
   if (material.emissive) addEmission(index, state, vertex);
-  if (path.seekingLight) return {};
+  if (path.seekingLight) return {.onward = Onward::Pass};
   const bool first =
       plan_.features && !path.featuresDone &&
       recordFeatures(scene_, vertex, plan_.settings.maxDepth, sample_[static_cast<size_t>(index)].features);
   path.featuresDone = path.featuresDone || first;
-  if (vertex.segments >= plan_.settings.maxDepth) return {};
-  path.choice = 1;
-  if (!vertex.bsdf.hasNonDelta()) return {.goesOn = true};
+  if (vertex.segments >= plan_.settings.maxDepth) return {.onward = Onward::Pass};
+  if (!vertex.bsdf.hasNonDelta()) return {.onward = Onward::Scatter};
 
-  const SampleBlock block = sampler_.block(state.key, static_cast<unsigned>(state.segments));
+  const SampleBlock block = sampler_.block(state.key, state.block());
   const float share = vertex.bsdf.broadShare();
   std::optional<Bsdf> broad, narrow;
   if (share > 0 && share < 1) {
@@ -82,14 +82,15 @@ PhotonEyeBatch::Step PhotonEyeBatch::shade(int index, SubpathState& state, Subpa
   if (caustics_ && share < 1) mergeCaustics(index, vertex, narrow ? *narrow : vertex.bsdf, 1 - share);
   const bool gathers = block.u[slot::kExtra] < share;
   if (broad) {
-    path.choice = gathers ? share : 1 - share;
+    path.choiceHere = gathers ? share : 1 - share;
     vertex.bsdf = gathers ? *broad : *narrow;
-    state.throughput /= path.choice;
-    vertex.throughput /= path.choice;
+    state.throughput /= path.choiceHere;
+    vertex.throughput /= path.choiceHere;
   }
-  if (!gathers) return {.goesOn = true};
+  if (!gathers) return {.onward = Onward::Scatter};
   path.seekingLight = true;
-  return {.goesOn = lightsCanBeHit_ && !plan_.settings.photonDirect, .gather = true};
+  const bool seeks = lightsCanBeHit_ && !plan_.settings.photonDirect;
+  return {.onward = seeks ? Onward::Scatter : Onward::End, .gather = true};
 }
 
 void PhotonEyeBatch::addGathered(int index, const SubpathVertex& vertex, const PhotonSum& sum, double lightPaths,
@@ -153,7 +154,7 @@ void PhotonEyeBatch::addEnvironment(int index, const SubpathState& state) {
   PathSample& sample = sample_[static_cast<size_t>(index)];
   Path& path = path_[static_cast<size_t>(index)];
   path.arrive(state);
-  const bool fromCamera = state.segments == 1;
+  const bool fromCamera = state.fromCamera();
   if (fromCamera) sample.coverage = 0;
   Spectrum radiance(0);
   if (fromCamera && plan_.settings.background) {
@@ -202,18 +203,18 @@ void PhotonEyeBatch::sampleLight(int index, const SubpathVertex& vertex, const L
   contribution *= mediaTransmittance(scene_, media, light.distance);
 
   const uint32_t salt = sampler_.salt(vertex.key, 0x10000u + static_cast<uint32_t>(vertex.segments)) & ~kCameraRay;
-  shadowRays_.set(shadowCount_, shadowRay(hit, light.wi, light.distance, salt));
+  shadowRays_.set(shadowCount_, shadowRay(hit, light.wi, light.distance, salt), mediumIndex(scene_, media));
   shadow_[static_cast<size_t>(shadowCount_)] = {index, contribution, forFeatures};
   if (++shadowCount_ == kBatch) traceShadows();
 }
 
 void PhotonEyeBatch::traceShadows() {
-  std::array<bool, kBatch> hidden;
-  scene_.accel().occluded(shadowRays_, shadowCount_, hidden.data());
+  shadowRays_.trace(shadowCount_);
   shadowRayCount += static_cast<uint64_t>(shadowCount_);
   for (int k = 0; k < shadowCount_; ++k) {
-    if (hidden[static_cast<size_t>(k)]) continue;
-    const Shadow& shadow = shadow_[static_cast<size_t>(k)];
+    if (shadowRays_.hidden(k)) continue;
+    Shadow& shadow = shadow_[static_cast<size_t>(k)];
+    shadowRays_.attenuate(k, shadow.contribution);
     PathSample& sample = sample_[static_cast<size_t>(shadow.index)];
     sample.radiance += shadow.contribution;
     if (shadow.forFeatures) sample.features.visibility = 1;

@@ -39,7 +39,7 @@ class PhotonEyeBatch {
         [&](int index, SubpathState& state, SubpathVertex& vertex) {
           const Step step = shade(index, state, vertex);
           if (step.gather) onGather(index, static_cast<const SubpathVertex&>(vertex));
-          return step.goesOn;
+          return step.onward;
         },
         [&](int index, const SubpathState& state) { addEnvironment(index, state); });
     traceShadows();
@@ -56,7 +56,8 @@ class PhotonEyeBatch {
 
  private:
   struct Step {
-    bool goesOn = false, gather = false;
+    Onward onward = Onward::End;
+    bool gather = false;
   };
   // The lobes of a vertex by group; null: there are none.
   struct Lobes {
@@ -64,7 +65,8 @@ class PhotonEyeBatch {
     float broadShare = 0;
   };
   struct Path {
-    float choice = 1;           // probability of the group by which the path goes on
+    // Probability of the group by which the path goes on from the vertex under way, and went on from the last one.
+    float choiceHere = 1, choice = 1;
     bool seekingLight = false;  // ends at the next surface
     bool featuresDone = false;
     // Squared, per probability of going on: CausticMerging's density at the vertex under way, and at the one from which
@@ -72,7 +74,12 @@ class PhotonEyeBatch {
     double mergedHere2 = 0, merged2 = 0;
 
     void arrive(const SubpathState& state) {
-      if (state.deltaRun == 0) merged2 = mergedHere2;
+      // A pane that was passed was no vertex.
+      if (!state.throughPane) {
+        choice = choiceHere;
+        if (state.deltaRun == 0) merged2 = mergedHere2;
+      }
+      choiceHere = 1;
       mergedHere2 = 0;
     }
   };
@@ -106,7 +113,7 @@ class PhotonEyeBatch {
     Spectrum contribution;
     bool forFeatures;
   };
-  ShadowBatch shadowRays_;
+  VisibilityBatch shadowRays_;
   std::array<Shadow, kBatch> shadow_;
   int shadowCount_ = 0;
 };

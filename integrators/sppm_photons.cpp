@@ -73,16 +73,17 @@ bool tracePhotons(const TransportContext& context, const PhotonEmission& light, 
                                  [&](uint64_t, const SubpathState& state, const SubpathVertex& v) {
                                    const bool broad = depositsPhoton(v, firstSegment),
                                               caustic = merges && depositsCaustic(v);
-                                   if (!broad && !caustic) return true;
+                                   if (!broad && !caustic) return Onward::Scatter;
                                    const auto draw = static_cast<uint32_t>(v.segments) | 0x40000000u;
-                                   if (keep < 1 && hashToUnit(light.sampler.salt(state.key, draw)) >= keep) return true;
+                                   if (keep < 1 && hashToUnit(light.sampler.salt(state.key, draw)) >= keep)
+                                     return Onward::Scatter;
                                    CausticPhoton photon;
-                                   if (!makePhoton(v, keep, photon)) return true;
+                                   if (!makePhoton(v, keep, photon)) return Onward::Scatter;
                                    if (broad) photons[c].push_back(photon);
-                                   if (!caustic) return true;
+                                   if (!caustic) return Onward::Scatter;
                                    photon.hitDensity = static_cast<float>(std::sqrt(state.chain));
                                    caustics[c].push_back(photon);
-                                   return true;
+                                   return Onward::Scatter;
                                  });
   });
   if (cancelled) return false;

@@ -131,21 +131,21 @@ Pilot runPilot(const TransportContext& context, const Plan& plan, const LightEmi
     followLightPaths(context, light, plan.settings.maxDepth, begin, end,
                      [&](uint64_t item, const SubpathState& state, const SubpathVertex& v) {
                        LightRecord& record = records[state.light];
-                       if (v.segments == 1) std::atomic_ref<uint32_t>(record.paths).fetch_add(1);
+                       if (v.segments == 1 && !state.throughPane) std::atomic_ref<uint32_t>(record.paths).fetch_add(1);
                        if (merges && depositsCaustic(v)) ++storedHere;
-                       if (!depositsPhoton(v, firstSegment)) return true;
+                       if (!depositsPhoton(v, firstSegment)) return Onward::Scatter;
                        ++storedHere;
                        uint64_t& last = counted[(item - begin) % kBatch];
-                       if (!aiming || last == item) return true;
+                       if (!aiming || last == item) return Onward::Scatter;
                        const Vec3& p = v.hit.position;
                        const RadiusScale& scale = visible.scale();
                        const float radius = scale.radiusAt(p, 2 * glm::length(p - scale.camera));
                        bool seen = false;
                        visible.query(p, radius, [&](const Photon&, float) { seen = true; });
-                       if (!seen) return true;
+                       if (!seen) return Onward::Scatter;
                        last = item;
                        std::atomic_ref<uint32_t>(record.useful).fetch_add(1);
-                       return true;
+                       return Onward::Scatter;
                      });
     stored += storedHere;
   });

@@ -123,11 +123,10 @@ class VertexConnectionAndMerging final : public Integrator {
                        pixelItem(request.plan, w.x0 + static_cast<int>(i % width), w.y0 + static_cast<int>(i / width)));
         batch.run(
             [&](int, const SubpathState&, const SubpathVertex& v) {
-              if (v.woBelow) return false;
-              if (v.bsdf.hasNonDelta())
+              if (!v.woBelow && v.bsdf.hasNonDelta())
                 out.push_back({v.hit.position, v.hit.wo, v.throughput, std::abs(glm::dot(v.hit.wo, v.hit.ng)),
                                v.segments, v.mis});
-              return true;
+              return Onward::Scatter;
             },
             [](int, const SubpathState&) {});
       }

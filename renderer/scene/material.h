@@ -12,6 +12,9 @@ namespace braid {
 
 enum class AlphaMode : uint8_t { Opaque, Mask, Blend };
 
+// GGX alpha below which a surface is taken for smooth: a mirror, or a clear pane.
+inline constexpr float kSmoothAlpha = 1e-3f;
+
 struct Material {
   std::string name;
 
@@ -85,6 +88,11 @@ struct Material {
   bool emissive() const { return maxComponent(emission) > 0; }
   bool transmissive() const { return transmission > 0; }
   bool hasVolume() const { return !thinWalled && (transmissive() || diffuseTransmission > 0); }
+  // Whether light may go straight on through it somewhere: transmissive, thin, smooth.
+  bool mayBePane() const {
+    return transmissive() && thinWalled && !unlit && !specularGlossiness &&
+           (metallicRoughnessTexture || (metallic < 1 && roughness * roughness < kSmoothAlpha));
+  }
   // Tangents are needed by normal maps and by anisotropy.
   bool needsTangents() const { return normalTexture || clearcoatNormalTexture || anisotropy != 0; }
 };

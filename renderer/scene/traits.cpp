@@ -31,7 +31,8 @@ std::vector<std::string> SceneTraits::names() const {
                                  "environment",
                                  "environment-image",
                                  "smooth-specular",
-                                 "unlit"};
+                                 "unlit",
+                                 "panes"};
   std::vector<std::string> list;
   for (size_t i = 0; i < std::size(kNames); ++i)
     if (has(1u << i)) list.push_back(kNames[i]);
@@ -75,6 +76,7 @@ uint32_t materialFlags(const Material& m) {
   const bool hasSpecular = m.metallic > 0 || m.specular > 0 || m.specularGlossiness;
   if (hasSpecular) flags |= kTraitSpecular;
   if (m.transmission > 0) flags |= kTraitTransmission;
+  if (m.mayBePane()) flags |= kTraitPanes;
   if (m.hasVolume()) flags |= kTraitVolume;
   if (m.diffuseTransmission > 0) flags |= kTraitDiffuseTransmission;
   if (m.clearcoat > 0) flags |= kTraitClearcoat;

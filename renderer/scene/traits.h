@@ -34,6 +34,7 @@ enum TraitFlags : uint32_t {
   kTraitEnvironmentImage = 1u << 20,
   kTraitSmoothSpecular = 1u << 21,  // roughness < 0.1 on a metal, clearcoat or transmissive surface: may cast caustics
   kTraitUnlit = 1u << 22,
+  kTraitPanes = 1u << 23,  // light may go straight on through a surface: Material::mayBePane()
 };
 
 struct SceneTraits {

@@ -42,6 +42,7 @@ void Bsdf::initLayers(const SurfaceParameters& p, Transport transport) {
   keep(kLobeIridescence, has(kLobeIridescence) && p.iridescence > 0);
 
   if (has(kLobeSpecular | kLobeTransmission)) initSpecular(p);
+  straight_ = has(kLobeTransmission) && p.thinWalled && smooth_;
   radianceScale_ = has(kLobeTransmission) ? 1 / sqr(eta_) : 1.0f;
   transmissionScale_ = transport == Transport::Radiance ? 1.0f : sqr(eta_);
 
@@ -247,7 +248,7 @@ BsdfValue Bsdf::evaluateLayers(const Vec3& wi, bool reverse) const {
 }
 
 bool Bsdf::sampleLayers(float uLobe, const Vec2& u, BsdfSample& out) const {
-  out.delta = out.transmitted = false;
+  out.delta = out.transmitted = out.straight = false;
   BsdfValue v;
   if (!sampleDirection(uLobe, u, out, v)) return false;
   if (out.delta) return out.pdfW > 0;

@@ -39,6 +39,7 @@ struct BsdfSample {
   float pdfW = 0;      // density of the whole lobe set; for a delta lobe the discrete probability of picking it
   bool delta = false;
   bool transmitted = false;  // wi is on the other side of the surface than wo
+  bool straight = false;     // delta, along -wo through a pane: no event, whatever wi says below a shading horizon
 };
 
 // What travels from wi to wo: radiance on paths from the eye, importance's dual on paths from a light.
@@ -78,10 +79,14 @@ class Bsdf {
     out.wi = squareToCosineHemisphere(u);
     out.weight = diffuse_;
     out.pdfW = out.wi.z * kInvPi;
-    out.delta = out.transmitted = false;
+    out.delta = out.transmitted = out.straight = false;
     return true;
   }
 
+  // What a thin, smooth surface lets straight through, 0 for all others: by BSDF sampling, weight · pdf of samples that
+  // are `straight`. The same from both sides.
+  Spectrum straightTransmittance() const { return diffuseOnly_ || !straight_ ? Spectrum(0) : transmittance(); }
+  bool passesStraight() const { return !diffuseOnly_ && straight_; }
   // Whether evaluate() can be non-zero.
   bool hasNonDelta() const { return diffuseOnly_ || nonDelta_; }
   // Directional reflectance for wo, each channel in [0, 1]: a feature for denoisers, smooth rather than exact.
@@ -150,6 +155,7 @@ class Bsdf {
   bool sampleMicrofacet(float uLobe, const Vec2& u, BsdfSample& out, BsdfValue& v) const;
   Vec3 refractSmooth() const;
   bool sampleMirror(float uLobe, BsdfSample& out) const;
+  Spectrum transmittance() const;
   bool samplePassThrough(BsdfSample& out) const;
 
   // lobes_layers.cpp: what covers the base, and how much light it lets through
@@ -182,6 +188,7 @@ class Bsdf {
   bool general_;                   // the Fresnel term is no plain Schlick curve
   bool refractive_;                // a solid with a refractive index: Snell's law applies
   bool smooth_;                    // the specular lobe is a mirror
+  bool straight_;                  // a pane: thin, and its transmission a delta
   bool passThrough_;               // transmission is smooth although the reflection is not
   bool microfacetOnly_;            // no lobe but GGX reflection and transmission
   bool weighsDiffuse_;             // diffuse lobes lie below a specular layer

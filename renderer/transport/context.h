@@ -20,6 +20,7 @@ struct RecordedRay : RayQuery {
 struct MaterialSummary {
   uint32_t lobes = 0;  // LobeFlags
   bool emissive = false, unlit = false, volume = false;
+  bool pane = false;  // Material::mayBePane()
   bool special() const { return emissive || unlit || volume; }
 };
 
@@ -31,7 +32,7 @@ struct TransportContext {
   explicit TransportContext(const Scene& s, LightStrategy strategy = LightStrategy::Automatic)
       : scene(s), lights(s, strategy) {
     for (const Material& m : s.materials())
-      materials.push_back({materialLobes(m), m.emissive(), m.unlit, m.hasVolume()});
+      materials.push_back({materialLobes(m), m.emissive(), m.unlit, m.hasVolume(), m.mayBePane()});
   }
   const MaterialSummary& summaryOf(const Hit& hit) const { return materials[hit.mesh->material]; }
 };

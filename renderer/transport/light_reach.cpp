@@ -40,16 +40,19 @@ double chanceToHit(double area, float length) {
 class VisibleCells {
  public:
   explicit VisibleCells(const Vec3& camera, float smallest) : camera_(camera), smallest_(smallest) {}
-  void add(const Vec3& p, const Vec3& normal, double weight) {
+  void add(const Vec3& p, const Vec3& normal, double weight, bool overMirrors) {
     const uint64_t key = keyOf(p, sizeOf(p));
     cells_[key] += weight;
     sides_[sideOf(key, normal)] += weight;
+    if (overMirrors) overMirrors_[key] += weight;
     total_ += weight;
   }
   double total() const { return total_; }
   // Weight per m² of surface at a point.
   double density(const Vec3& p) const { return densityIn(cells_, p, keyOf(p, sizeOf(p))); }
-  // The same of surfaces that face roughly the same way: cells are larger than walls are thick.
+  // The same of what is seen over mirrors and through glass.
+  double densityOverMirrors(const Vec3& p) const { return densityIn(overMirrors_, p, keyOf(p, sizeOf(p))); }
+  // That of surfaces that face roughly the same way: cells are larger than walls are thick.
   double density(const Vec3& p, const Vec3& normal) const {
     return densityIn(sides_, p, sideOf(keyOf(p, sizeOf(p)), normal));
   }
@@ -75,7 +78,7 @@ class VisibleCells {
   Vec3 camera_;
   float smallest_;
   double total_ = 0;
-  std::unordered_map<uint64_t, double> cells_, sides_;
+  std::unordered_map<uint64_t, double> cells_, sides_, overMirrors_;
 };
 
 WalkSettings probeWalk(Transport transport) {
@@ -92,10 +95,11 @@ VisibleCells findVisibleCells(const TransportContext& context, const PassSampler
   VisibleCells cells(camera.position(), 1e-6f * context.scene.traits().radius);
   SubpathBatch batch(context, sampler, probeWalk(Transport::Radiance));
   const auto onHit = [&](int, const SubpathState& state, const SubpathVertex& vertex) {
-    if (!(state.leastPdfW > kFocusingPdf)) return false;
-    if (!vertex.bsdf.hasNonDelta()) return true;
-    cells.add(vertex.hit.position, vertex.hit.ng, static_cast<double>(average(vertex.throughput)));
-    return true;
+    if (!(state.leastPdfW > kFocusingPdf)) return Onward::End;
+    if (vertex.bsdf.hasNonDelta())
+      cells.add(vertex.hit.position, vertex.hit.ng, static_cast<double>(average(vertex.throughput)),
+                vertex.deltaOnly && vertex.segments > 1);
+    return Onward::Scatter;
   };
   for (int first = 0; first < kEyePaths; first += kBatch) {
     batch.clear();
@@ -123,13 +127,21 @@ LightReach measureLightReach(const TransportContext& context, const Camera& came
   const VisibleCells visible = findVisibleCells(context, sampler, camera, width, height);
   const std::map<uint32_t, double> areas = lampAreas(scene);
   double total = 0, scattered = 0;
-  const auto onHit = [&](int, const SubpathState& state, const SubpathVertex& vertex) {
-    if (vertex.woBelow) return false;
-    if (!vertex.bsdf.hasNonDelta()) return true;
+  std::array<bool, kBatch> deltaFirst;  // of each walk: its first scattering was delta
+  const auto onHit = [&](int index, const SubpathState& state, const SubpathVertex& vertex) {
+    bool& aimless = deltaFirst[static_cast<size_t>(index)];
+    if (vertex.segments <= 2) aimless = vertex.segments == 2 && vertex.deltaOnly;
+    if (vertex.woBelow || !vertex.bsdf.hasNonDelta()) return Onward::Scatter;
     const double density = visible.density(vertex.hit.position);
-    const double value = density * static_cast<double>(average(vertex.throughput * vertex.bsdf.albedo()));
-    if (!(value > 0) || !std::isfinite(value)) return true;
+    const double light = static_cast<double>(average(vertex.throughput * vertex.bsdf.albedo())),
+                 value = density * light;
+    if (!(value > 0) || !std::isfinite(value)) return Onward::Scatter;
     total += value;
+    const bool lamp = state.light < context.lights.firstPositional();
+    if (aimless && !lamp) {
+      reach.beyondCameraPaths += value;
+      if (vertex.deltaOnly) reach.beyondConnections += visible.densityOverMirrors(vertex.hit.position) * light;
+    }
     if (vertex.segments > 1)
       scattered +=
           visible.density(vertex.hit.position, vertex.hit.ng) * static_cast<double>(average(vertex.throughput));
@@ -137,14 +149,13 @@ LightReach measureLightReach(const TransportContext& context, const Camera& came
       reach.direct += value;
     } else if (state.leastPdfW > kFocusingPdf) {
       reach.caustic += value;
-      const bool lamp = state.light < context.lights.firstPositional();
       if (!lamp) reach.unreachable += value;
       reach.causticVariance +=
           value / chanceToHit(lamp ? areas.at(scene.emitters()[state.light].mesh) : 0, state.travelled);
     } else {
       reach.indirect += value;
     }
-    return true;
+    return Onward::Scatter;
   };
 
   SubpathBatch batch(context, sampler, probeWalk(Transport::Power));
@@ -166,7 +177,8 @@ LightReach measureLightReach(const TransportContext& context, const Camera& came
     batch.run(onHit, [](int, const SubpathState&) {});
   }
   if (total > 0)
-    for (double* share : {&reach.direct, &reach.indirect, &reach.caustic, &reach.causticVariance, &reach.unreachable})
+    for (double* share : {&reach.direct, &reach.indirect, &reach.caustic, &reach.causticVariance, &reach.unreachable,
+                          &reach.beyondCameraPaths, &reach.beyondConnections})
       *share /= total;
   if (scattered > 0 && std::isfinite(scattered))
     reach.scatteredRadiance = scattered / (static_cast<double>(kPi) * kPaths * visible.total());

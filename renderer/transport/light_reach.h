@@ -21,6 +21,12 @@ struct LightReach {
   // Not a share: the radiance that all light but the direct gives to a white surface, averaged over what the camera
   // sees, W/(m² sr).
   double scatteredRadiance = 0;
+  // From points and directions, scattered first by a mirror or a smooth refraction: light sampling cannot aim over
+  // these, and nothing hits such lights, so that no camera path finds it at all.
+  double beyondCameraPaths = 0;
+  // Of that what arrives over mirrors and through glass alone where the camera sees it in the same way: nothing can be
+  // connected, only photons find it.
+  double beyondConnections = 0;
 };
 
 // A pure function of the scene and the camera. Costs about as much as a pass of 128 x 128 pixels.

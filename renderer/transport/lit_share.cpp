@@ -32,28 +32,32 @@ float emittedTowards(const Scene& scene, const Hit& hit) {
 // What the paths of one batch see.
 class Glance {
  public:
-  Glance(const TransportContext& context, const PassSampler& sampler) : context_(context), sampler_(sampler) {}
+  Glance(const TransportContext& context, const PassSampler& sampler)
+      : context_(context), sampler_(sampler), rays_(context) {}
 
-  bool onHit(int index, const SubpathVertex& vertex) {
+  Onward onHit(int index, const SubpathVertex& vertex) {
     const auto i = static_cast<size_t>(index);
     met_ = true;
-    if (vertex.hit.material->unlit) return false;
+    if (vertex.hit.material->unlit) return Onward::End;
     level_[i] += emittedTowards(context_.scene, vertex.hit);
-    if (!vertex.bsdf.hasNonDelta()) return true;
+    if (!vertex.bsdf.hasNonDelta()) return Onward::Scatter;
     weight_[i] = average(vertex.throughput);
     sampleLight(i, vertex);
-    return false;
+    return Onward::End;
   }
-  // A mirror that shows the void is seen, and dark.
+  // A mirror or a pane that shows the void is seen, and dark.
   void onMiss(int index, const SubpathState& state) {
-    if (state.segments > 1) weight_[static_cast<size_t>(index)] = average(state.throughput);
+    if (!state.fromCamera()) weight_[static_cast<size_t>(index)] = average(state.throughput);
   }
 
   void addTo(LitShare& sum, double reference) {
-    std::array<bool, kBatch> hidden{};
-    context_.scene.accel().occluded(rays_, shadows_, hidden.data());
-    for (int k = 0; k < shadows_; ++k)
-      if (!hidden[static_cast<size_t>(k)]) level_[owner_[static_cast<size_t>(k)]] += arriving_[static_cast<size_t>(k)];
+    rays_.trace(shadows_);
+    for (int k = 0; k < shadows_; ++k) {
+      if (rays_.hidden(k)) continue;
+      Spectrum arriving(arriving_[static_cast<size_t>(k)]);
+      rays_.attenuate(k, arriving);
+      level_[owner_[static_cast<size_t>(k)]] += average(arriving);
+    }
     for (size_t i = 0; i < weight_.size(); ++i) {
       const double weight = static_cast<double>(weight_[i]);
       if (!(weight > 0) || !std::isfinite(weight)) continue;
@@ -65,7 +69,7 @@ class Glance {
 
  private:
   void sampleLight(size_t i, const SubpathVertex& vertex) {
-    const SampleBlock u = sampler_.block(vertex.key, static_cast<unsigned>(vertex.segments));
+    const SampleBlock u = sampler_.block(vertex.key, vertex.block);
     const Hit& hit = vertex.hit;
     LightSample light;
     if (!context_.lights.sample(hit.position, vertex.receiverNormal(), vertex.twoSided, u.u[slot::kLightSelect],
@@ -82,14 +86,14 @@ class Glance {
     owner_[k] = i;
     arriving_[k] = value;
     const uint32_t salt = sampler_.salt(vertex.key, 0) & ~kCameraRay;
-    rays_.set(shadows_++, shadowRay(hit, light.wi, light.distance, salt));
+    rays_.set(shadows_++, shadowRay(hit, light.wi, light.distance, salt), mediumIndex(context_.scene, vertex.media));
   }
 
   const TransportContext& context_;
   const PassSampler& sampler_;
   std::array<float, kBatch> weight_{}, level_{}, arriving_{};
   std::array<size_t, kBatch> owner_{};
-  ShadowBatch rays_;
+  VisibilityBatch rays_;
   int shadows_ = 0;
   bool met_ = false;
 };

@@ -140,6 +140,7 @@ bool Bsdf::sampleMirror(float uLobe, BsdfSample& out) const {
   out.delta = true;
   out.transmitted = !(uLobe < q);
   if (out.transmitted) {
+    out.straight = straight_;
     out.wi = refractSmooth();
     out.pdfW = select_.specular * (1 - q);
     out.weight = transmission_ * (fr.base * transmissionScale_ / sqr(eta_));
@@ -151,6 +152,9 @@ bool Bsdf::sampleMirror(float uLobe, BsdfSample& out) const {
   out.weight *= belowLayers(out.wi) / out.pdfW;
   return true;
 }
+
+// Of a pane: sampleMirror()'s transmission without its probability.
+Spectrum Bsdf::transmittance() const { return transmission_ * (fresnel(wo_.z).base * belowLayers(-wo_)); }
 
 bool Bsdf::samplePassThrough(BsdfSample& out) const {
   const FresnelTerm fr = fresnel(wo_.z);

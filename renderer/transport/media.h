@@ -79,6 +79,12 @@ inline Spectrum mediaTransmittance(const Scene& scene, const MediaStack& media, 
   return medium < 0 ? Spectrum(1) : volumeTransmittance(scene.materials()[static_cast<size_t>(medium)], distance);
 }
 
+// Refractive index of whatever rules there.
+inline float mediumIndex(const Scene& scene, const MediaStack& media) {
+  const int64_t medium = media.empty() ? -1 : media.ruling(scene.materials());
+  return medium < 0 ? 1.0f : scene.materials()[static_cast<size_t>(medium)].ior;
+}
+
 // Refractive index on the outside of a hit surface, for a path inside of `media`.
 inline float indexOutside(const Scene& scene, const MediaStack& media, const Hit& hit) {
   if (media.empty()) return 1;

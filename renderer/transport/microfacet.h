@@ -7,13 +7,14 @@
 #include <cmath>
 
 #include "renderer/core/vec.h"
+#include "renderer/scene/material.h"
 #include "renderer/transport/warp.h"
 
 namespace braid {
 
 struct Ggx {
   // Below this alpha a surface is a mirror: float half vectors no longer resolve the lobe.
-  static constexpr float kMinAlpha = 1e-3f;
+  static constexpr float kMinAlpha = kSmoothAlpha;
 
   float alphaX, alphaY;
 

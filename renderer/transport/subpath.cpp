@@ -105,8 +105,8 @@ void SubpathBatch::startNothing() {
 
 void SubpathBatch::queueRay(int slot, SubpathState& state) {
   if (filtered_) {
-    const bool camera = settings_.transport == Transport::Radiance && state.segments == 1;
-    const uint32_t salt = sampler_.salt(state.key, static_cast<uint32_t>(state.segments + state.nullCrossings));
+    const bool camera = settings_.transport == Transport::Radiance && state.fromCamera();
+    const uint32_t salt = sampler_.salt(state.key, state.block() + static_cast<uint32_t>(state.nullCrossings));
     state.salt = (salt & ~kCameraRay) | (camera ? kCameraRay : 0);
   }
   rays_.set(slot, {state.origin, state.direction, kInfinity, state.salt});
@@ -124,35 +124,16 @@ void SubpathBatch::trace(int active) {
   }
 }
 
-SubpathBatch::Arrival SubpathBatch::arrive(SubpathState& state, const Hit& hit) const {
+SubpathBatch::Arrival SubpathBatch::arrive(SubpathState& state, const Hit& hit, MisQuantities& here) const {
   state.throughput *= mediaTransmittance(scene_, state.media, hit.distance);
   state.travelled += hit.distance;
   const MaterialSummary& material = context_.summaryOf(hit);
   if (settings_.transport == Transport::Power) {
     if (material.unlit || !applyRange(state, hit)) return Arrival::End;
   }
-  if (settings_.mis) {
-    const double cosine = geometricCosine(hit, hit.wo);
-    if (settings_.transport == Transport::Power && state.atStart) {
-      // (31)-(33), here and not at the start because the density of choosing the light depends on where its path
-      // arrives.
-      const bool twoSided = (material.lobes & (kLobeTransmission | kLobeDiffuseTransmission)) != 0;
-      const float direct = context_.lights.pdfDirect(state.light, hit.position, twoSided ? hit.ng : hit.frame.n,
-                                                     twoSided, -state.direction);
-      const double emit = static_cast<double>(state.pdfEmit);
-      state.mis.vcm = sqr(static_cast<double>(direct) / emit);
-      state.mis.vc = state.deltaLight ? 0.0 : sqr(static_cast<double>(state.cosLight) / emit);
-      state.mis.vm = state.mis.vc * settings_.connectWeight;
-    }
-    const double inverse = 1 / sqr(cosine);
-    if (!state.atStart || state.byDistance) state.mis.vcm *= sqr(sqr(static_cast<double>(hit.distance)));
-    state.mis.vcm *= inverse;
-    state.mis.vc *= inverse;
-    state.mis.vm *= inverse;
-  }
+  if (settings_.mis) here = quantitiesAt(state, hit);
   if (settings_.deltaChains) state.chain /= sqr(geometricCosine(hit, hit.wo));
-  state.atStart = false;
-  if (material.volume && crossNullInterface(state, hit))
+  if (material.volume && crossNullInterface(state, hit, here))
     return state.nullCrossings < kMaxNullCrossings ? Arrival::Null : Arrival::End;
   return Arrival::Vertex;
 }
@@ -172,27 +153,61 @@ bool SubpathBatch::applyRange(SubpathState& state, const Hit& hit) const {
   return true;
 }
 
+// The conversion to area.
+MisQuantities SubpathBatch::quantitiesAt(const SubpathState& state, const Hit& hit) const {
+  MisQuantities m = state.mis;
+  if (settings_.transport == Transport::Power && state.atStart) {
+    // (31)-(33), here and not at the start because the density of choosing the light depends on where its path arrives.
+    const bool twoSided = (context_.summaryOf(hit).lobes & (kLobeTransmission | kLobeDiffuseTransmission)) != 0;
+    const float direct = context_.lights.pdfDirect(state.light, hit.position, twoSided ? hit.ng : hit.frame.n, twoSided,
+                                                   -state.direction);
+    const double emit = static_cast<double>(state.pdfEmit);
+    m.vcm = sqr(static_cast<double>(direct) / emit);
+    m.vc = state.deltaLight ? 0.0 : sqr(static_cast<double>(state.cosLight) / emit);
+    m.vm = m.vc * settings_.connectWeight;
+  }
+  const double inverse = 1 / sqr(geometricCosine(hit, hit.wo));
+  if (!state.atStart || state.byDistance) m.vcm *= sqr(sqr(static_cast<double>(state.passed + hit.distance)));
+  m.vcm *= inverse;
+  m.vc *= inverse;
+  m.vm *= inverse;
+  return m;
+}
+
 // As in the path tracer: inside of a solid that rules there, another solid's surface scatters nothing.
-bool SubpathBatch::crossNullInterface(SubpathState& state, const Hit& hit) const {
+bool SubpathBatch::crossNullInterface(SubpathState& state, const Hit& hit, const MisQuantities& here) const {
   if (!isNullInterface(scene_, state.media, hit)) return false;
   state.media.cross(hit.mesh->material, hit.front);
   state.origin = offsetOrigin(hit, state.direction);
   state.lightCouldNotBeSampled = true;
+  state.atStart = false;
+  state.passed = 0;
   ++state.nullCrossings;
   if (settings_.deltaChains) state.chain *= sqr(geometricCosine(hit, state.direction));
   if (settings_.mis) {
     const double cosine2 = sqr(geometricCosine(hit, state.direction));
-    state.mis = {0, state.mis.vc * cosine2, state.mis.vm * cosine2};
+    state.mis = {0, here.vc * cosine2, here.vm * cosine2};
   }
   return true;
+}
+
+// Straight on through a pane: all but the throughput stays that of the last vertex. False: nothing gets through.
+bool SubpathBatch::pass(SubpathState& state, const Hit& hit, const Spectrum& weight) const {
+  state.throughput *= weight;
+  if (isBlack(state.throughput)) return false;
+  state.origin = offsetOrigin(hit, state.direction);
+  state.passed += hit.distance;
+  state.throughPane = true;
+  if (settings_.deltaChains) state.chain *= sqr(geometricCosine(hit, state.direction));
+  return ++state.panes < kMostPanes;
 }
 
 void SubpathBatch::finishVertex(const SubpathState& state, const Hit& hit, SubpathVertex& vertex) const {
   vertex.hit = hit;
   vertex.throughput = state.throughput;
   vertex.media = state.media;
-  vertex.mis = state.mis;
   vertex.key = state.key;
+  vertex.block = state.block();
   vertex.segments = state.segments;
   vertex.travelled = state.travelled;
   vertex.twoSided = (context_.summaryOf(hit).lobes & (kLobeTransmission | kLobeDiffuseTransmission)) != 0;
@@ -202,11 +217,26 @@ void SubpathBatch::finishVertex(const SubpathState& state, const Hit& hit, Subpa
 
 bool SubpathBatch::scatter(SubpathState& state, const SubpathVertex& vertex) const {
   const bool power = settings_.transport == Transport::Power;
-  if (power && vertex.woBelow) return false;
-  const SampleBlock block = sampler_.block(state.key, static_cast<unsigned>(state.segments) + (power ? 1u : 0u));
-  BsdfSample sample;
   const Hit& hit = vertex.hit;
+  if (power && vertex.woBelow) return pass(state, hit, vertex.bsdf.straightTransmittance());
+  const SampleBlock block = sampler_.block(state.key, state.block() + (power ? 1u : 0u));
+  BsdfSample sample;
   if (!vertex.bsdf.sample(block.u[slot::kLobe], {block.u[slot::kBsdfU], block.u[slot::kBsdfV]}, sample)) return false;
+  if (!(sample.straight ? pass(state, hit, sample.weight) : turn(state, vertex, sample))) return false;
+
+  const float relative = maxComponent(state.throughput) / (state.startThroughput * state.etaScale);
+  const float survival = settings_.roulette.survival(state.segments, relative);
+  if (survival < 1) {
+    if (!(block.u[slot::kRoulette] < survival)) return false;
+    state.throughput /= survival;
+  }
+  if (!sample.straight) ++state.segments;
+  return true;
+}
+
+bool SubpathBatch::turn(SubpathState& state, const SubpathVertex& vertex, const BsdfSample& sample) const {
+  const bool power = settings_.transport == Transport::Power;
+  const Hit& hit = vertex.hit;
   const Vec3 direction = renormalize(hit.frame.toWorld(sample.wi));
   const float geometric = glm::dot(direction, hit.ng);
   if ((geometric > 0) == sample.transmitted) return false;
@@ -220,7 +250,7 @@ bool SubpathBatch::scatter(SubpathState& state, const SubpathVertex& vertex) con
   }
   if (settings_.mis) {
     const double cosine = geometricCosine(hit, direction);
-    MisQuantities& m = state.mis;
+    MisQuantities m = vertex.mis;
     if (sample.delta) {  // (53)-(55)
       m = {0, m.vc * sqr(cosine), m.vm * sqr(cosine)};
     } else {  // (34)-(36)
@@ -232,6 +262,7 @@ bool SubpathBatch::scatter(SubpathState& state, const SubpathVertex& vertex) con
       m.vm = ratio * (m.vm * sqr(reverse) + m.vcm * settings_.connectWeight + 1);
       m.vcm = sqr(1 / forward);
     }
+    state.mis = m;
   }
   state.deltaRun = sample.delta ? state.deltaRun + 1 : 0;
   if (settings_.deltaChains) {
@@ -246,16 +277,9 @@ bool SubpathBatch::scatter(SubpathState& state, const SubpathVertex& vertex) con
   state.lastPdfW = sample.pdfW;
   state.lightCouldNotBeSampled = sample.delta;
   state.deltaOnly = state.deltaOnly && sample.delta;
-  state.straight = state.straight && sample.delta && sample.transmitted && hit.material->thinWalled;
   if (!sample.delta) state.leastPdfW = std::min(state.leastPdfW, sample.pdfW);
-
-  const float relative = maxComponent(state.throughput) / (state.startThroughput * state.etaScale);
-  const float survival = settings_.roulette.survival(state.segments, relative);
-  if (survival < 1) {
-    if (!(block.u[slot::kRoulette] < survival)) return false;
-    state.throughput /= survival;
-  }
-  ++state.segments;
+  state.atStart = state.throughPane = state.straight = false;
+  state.passed = 0;
   return true;
 }
 

@@ -7,6 +7,8 @@
 // Conventions that make all ways agree:
 //   - densities per area use the geometric normals, BSDF cosines the shading normals;
 //   - delta scattering and null interfaces (media.h) are vertices that no one can connect to;
+//   - a pane is no vertex for light that goes straight on through it: neither densities nor lengths of paths know of
+//     it, and shadow rays pass it too (visibility.h). It is an ordinary vertex for all else that its surface does;
 //   - the light side must see a surface from the same side by both normals, as for light samples of a path tracer; a
 //     camera side below the shading horizon is lifted to it, and no walk from a light can leave that way.
 #pragma once
@@ -21,6 +23,7 @@
 #include "renderer/transport/context.h"
 #include "renderer/transport/light_emission.h"
 #include "renderer/transport/roulette.h"
+#include "renderer/transport/visibility.h"
 
 namespace braid {
 
@@ -48,6 +51,7 @@ struct SubpathVertex {
   MediaStack media;        // on the side of wo
   MisQuantities mis;       // complete for this vertex
   uint64_t key = 0;
+  unsigned block = 0;      // of random numbers, of a camera walk
   int segments = 0;        // of the walk up to here
   bool twoSided = false;   // transmits
   float travelled = 0;     // metres since the start of the walk
@@ -69,6 +73,9 @@ struct VertexValue {
   MediaStack media;        // the solids that the direction leads into
 };
 
+// How a walk may go on from a vertex. Pass: only straight on, through a pane.
+enum class Onward : uint8_t { End, Pass, Scatter };
+
 struct SubpathState {
   Vec3 origin, direction;
   Spectrum throughput{1};
@@ -77,7 +84,10 @@ struct SubpathState {
   uint64_t key = 0;
   int segments = 1;  // including the ray that is under way
   int nullCrossings = 0;
-  float travelled = 0;  // metres since the start
+  int panes = 0;             // passed straight
+  bool throughPane = false;  // passed one since it scattered
+  float passed = 0;          // metres from where it scattered to the last pane since
+  float travelled = 0;       // metres since the start
   uint32_t salt = 0;
   float startThroughput = 1;
   float etaScale = 1;
@@ -102,6 +112,11 @@ struct SubpathState {
   bool deltaLight = false;
   bool straight = true;  // since the light: windows count the distance from there
   float window = 1;      // rangeWindow() as far as the throughput has it
+
+  // Of the random numbers at the surface ahead, of a camera walk.
+  unsigned block() const { return static_cast<unsigned>(segments + panes); }
+  // Nothing but null interfaces has been met.
+  bool fromCamera() const { return segments == 1 && panes == 0; }
 };
 
 // Value of a vertex's BSDF toward the unit world direction `wi`; f is zero where nothing can be.
@@ -114,7 +129,8 @@ class SubpathBatch {
   SubpathBatch(const TransportContext& context, const PassSampler& sampler, const WalkSettings& settings);
 
   // Begin a walk; the index of the walk is the order of these calls since clear(). Dimension blocks: camera walks use
-  // block k at their k-th vertex, light walks block k + 1 (block 1 belongs to the start).
+  // block k at their k-th vertex, panes that they pass included, light walks block k + 1 (block 1 belongs to the
+  // start).
   // `pdfPixel` is the density of the ray per steradian (perspective) or m² (orthographic), of one pixel; lightPaths the
   // number of light subpaths of the pass.
   void startCamera(uint64_t key, const Camera::CameraRay& ray, const MediaStack& media, double pdfPixel,
@@ -124,8 +140,9 @@ class SubpathBatch {
   void startNothing();
   void clear() { count_ = 0; }
 
-  // Follows all walks to their ends. onHit(index, state, vertex) → whether to go on; it sees every surface but null
-  // interfaces. onMiss(index, state) when a walk leaves the scene; state.mis is that of the departing ray.
+  // Follows all walks to their ends. onHit(index, state, vertex) → Onward; it sees every surface but null interfaces.
+  // Walks of maxSegments still pass panes. onMiss(index, state) when a walk leaves the scene; state.mis is that of the
+  // departing ray.
   template <class OnHit, class OnMiss>
   void run(const OnHit& onHit, const OnMiss& onMiss);
 
@@ -137,12 +154,16 @@ class SubpathBatch {
   void queueRay(int slot, SubpathState& state);
   // Traces the rays of all active walks and fills hits_.
   void trace(int active);
-  // Brings the walk to a hit: attenuation and the quantities' conversion to area.
-  Arrival arrive(SubpathState& state, const Hit& hit) const;
+  // Brings the walk to a hit: attenuation. `here`: the quantities there, state.mis stays that of the departing ray.
+  Arrival arrive(SubpathState& state, const Hit& hit, MisQuantities& here) const;
+  MisQuantities quantitiesAt(const SubpathState& state, const Hit& hit) const;
   bool applyRange(SubpathState& state, const Hit& hit) const;
   void finishVertex(const SubpathState& state, const Hit& hit, SubpathVertex& vertex) const;
   bool scatter(SubpathState& state, const SubpathVertex& vertex) const;
-  bool crossNullInterface(SubpathState& state, const Hit& hit) const;
+  // Goes on in a sampled direction.
+  bool turn(SubpathState& state, const SubpathVertex& vertex, const BsdfSample& sample) const;
+  bool pass(SubpathState& state, const Hit& hit, const Spectrum& weight) const;
+  bool crossNullInterface(SubpathState& state, const Hit& hit, const MisQuantities& here) const;
 
   const TransportContext& context_;
   const Scene& scene_;
@@ -176,7 +197,8 @@ void SubpathBatch::run(const OnHit& onHit, const OnMiss& onMiss) {
         continue;
       }
       const Hit& hit = hits_[static_cast<size_t>(a)];
-      const Arrival arrival = arrive(state, hit);
+      MisQuantities here;
+      const Arrival arrival = arrive(state, hit, here);
       if (arrival == Arrival::End) continue;
       if (arrival == Arrival::Vertex) {
         const uint32_t lobes = context_.summaryOf(hit).lobes;
@@ -185,9 +207,14 @@ void SubpathBatch::run(const OnHit& onHit, const OnMiss& onMiss) {
             lobes == kLobeDiffuse ? SubpathVertex(baseColorAt(scene_, hit), wo)
                                   : SubpathVertex(surfaceAt(scene_, hit, lobes, indexOutside(scene_, state.media, hit)),
                                                   wo, settings_.transport);
+        vertex.mis = here;
         finishVertex(state, hit, vertex);
-        if (!onHit(index, state, vertex)) continue;
-        if (state.segments >= settings_.maxSegments || !scatter(state, vertex)) continue;
+        Onward onward = onHit(index, state, vertex);
+        if (onward == Onward::End) continue;
+        if (state.segments >= settings_.maxSegments) onward = Onward::Pass;
+        const bool goesOn =
+            onward == Onward::Pass ? pass(state, hit, vertex.bsdf.straightTransmittance()) : scatter(state, vertex);
+        if (!goesOn) continue;
       }
       active_[static_cast<size_t>(alive)] = index;
       queueRay(alive++, state);
