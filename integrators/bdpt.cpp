@@ -38,6 +38,7 @@ class BidirectionalPathTracer final : public Integrator {
   Applies applies(const SceneTraits& traits, const LightReach& reach) const override {
     return connectionsApply(traits, reach);
   }
+  double misses(const LightReach& reach) const override { return reach.beyondConnections; }
   std::shared_ptr<const Preparation> prepare(const TransportContext& context, const Plan&) const override {
     return std::make_shared<LightPreparation>(context);
   }

@@ -35,6 +35,7 @@ class CommonRandomNumbers final : public Integrator {
   Applies applies(const SceneTraits&, const LightReach&) const override {
     return {false, "pixels share their errors: only for uncorrelated weighting, when named"};
   }
+  double misses(const LightReach& reach) const override { return reach.beyondCameraPaths; }
 
   std::unique_ptr<PassSampler> pixelSampler(const Plan& plan, uint64_t pass) const override {
     return std::make_unique<PassSampler>(SamplerKind::Independent, plan.settings.seed, kStream, pass);

@@ -132,6 +132,7 @@ class GradientDomainPathTracer final : public Integrator {
   Applies applies(const SceneTraits&, const LightReach&) const override {
     return {false, "several paths for each of the path tracer's: for smooth scenes, when named"};
   }
+  double misses(const LightReach& reach) const override { return reach.beyondCameraPaths; }
   WorkingMemory workingMemory(const Plan& plan) const override {
     const auto pixels = static_cast<uint64_t>(plan.window.width()) * static_cast<uint64_t>(plan.window.height());
     constexpr uint64_t kSampled = 3 * sizeof(float) * (2 + kNeighbours), kSolved = 2 * sizeof(double);

@@ -21,6 +21,7 @@ class PathTracer final : public Integrator {
     if (connectionsApply(traits, reach).yes) return {false, "bdpt has all its ways to find light, and more"};
     return {true, "unbiased for every scene"};
   }
+  double misses(const LightReach& reach) const override { return reach.beyondCameraPaths; }
 
   bool separatesDirectLight() const override { return true; }
 

@@ -79,6 +79,7 @@ std::vector<Attribute> planAttributes(const Scene& scene, const Plan& plan, cons
       matrix("worldToNDC", plan.camera.worldToNdc(scene.data().origin)),
   };
   if (s.clamp > 0) list.push_back(number("braid/clamp", static_cast<double>(s.clamp)));
+  if (!plan.unreachable.empty()) list.push_back(text(kUnreachableAttribute, plan.unreachable));
   return list;
 }
 

@@ -11,6 +11,9 @@
 
 namespace braid {
 
+// Plan::unreachable, where it is not empty.
+inline constexpr const char* kUnreachableAttribute = "braid/lightOutOfReach";
+
 // What does not depend on the passes: software, scene, plan, camera.
 std::vector<Attribute> planAttributes(const Scene& scene, const Plan& plan, const std::string& isa);
 

@@ -14,6 +14,7 @@
 #include "renderer/film/error_map.h"
 #include "renderer/film/output_file.h"
 #include "renderer/film/picture.h"
+#include "tools/header.h"
 #include "tools/option_checks.h"
 #include "tools/output_options.h"
 #include "tools/progress_line.h"
@@ -30,9 +31,18 @@ const MethodResult* headlineOf(const PipelineResult& combined, const std::vector
   return nullptr;
 }
 
-// The error of the last wanted method that ran, or of the first integrator.
+// What of the light no integrator could find; empty: none of it.
+std::string lightOutOfReach(const Estimates& estimates) {
+  for (const Attribute& a : estimates.attributes)
+    if (a.name == kUnreachableAttribute) return a.text;
+  return "";
+}
+
+// The error of the last wanted method that ran, or of the first integrator; none where light is missing, which leaves
+// no trace in the samples.
 std::optional<double> headlineError(const PipelineResult& combined, const std::vector<std::string>& wanted,
                                     const Estimates& estimates) {
+  if (!lightOutOfReach(estimates).empty()) return std::nullopt;
   if (const MethodResult* result = headlineOf(combined, wanted)) {
     if (result->error.empty()) return std::nullopt;
     return relativeError(result->error, squaredLevels(result->image.mean));
@@ -193,6 +203,8 @@ WrittenImage writeImage(const ImageOutput& o, Estimates& estimates, const Plane<
     exr.floatHeadline = o.floatHeadline;
     exr.layerPrefix = o.layerPrefix;
     written.warnings = combineWarnings(combined, o.combine.asked);
+    if (const std::string missing = lightOutOfReach(estimates); !missing.empty())
+      written.warnings.push_back(missing + "; the error of this image is not known");
     // Beside each other: a PNG is compressed by one thread.
     std::string warning;
     bothWhateverFails(

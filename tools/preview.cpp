@@ -168,6 +168,7 @@ int runPreview(PreviewOptions o) {
                    planAttributes(*scene, session.plan(), scene->accel().isa()));
   if (o.scene.verbose) fmt::print(stderr, "{}", plan.text());
   audience.board().setPlan(plan.text(), o.image.combine.combine, static_cast<int>(session.plan().integrators.size()));
+  if (!session.plan().unreachable.empty()) audience.warn(session.plan().unreachable);
   audience.board().setPhase(PreviewPhase::Rendering);
 
   ProgressLine line(o.scene.quiet);
@@ -175,7 +176,11 @@ int runPreview(PreviewOptions o) {
   {
     PreviewFeed feed(
         o.image.combine, session, settings.threads,
-        [&](uint64_t spp, double seconds, const ImageViews& v) { audience.show(spp, seconds, v); },
+        [&](uint64_t spp, double seconds, ImageViews v) {
+          // Light that is missing leaves no trace in the samples: their error is not known.
+          if (!session.plan().unreachable.empty()) v.noisyError = v.combinedError = nullptr;
+          audience.show(spp, seconds, v);
+        },
         [&](const std::string& text) { audience.warn(text); });
     result = session.advance(
         [&](const Progress& p) {

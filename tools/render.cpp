@@ -281,6 +281,12 @@ int runRender(RenderOptions o) {
   Session& session = *ownedSession;
   session.identify(BRAID_VERSION, BRAID_BUILD_FLAGS, sceneIdentity(o.scene, scene->data()),
                    planAttributes(*scene, session.plan(), scene->accel().isa()));
+  if (const std::string& missing = session.plan().unreachable; !missing.empty()) {
+    if (o.error > 0 && settings.spp == 0 && settings.seconds == 0)
+      throw Error(ExitCode::Usage, "--error: would never be reached: " + missing);
+    if (!o.scene.quiet) fmt::print(stderr, "warning: {}\n", missing);
+    json.write("warning", {{"text", missing}});
+  }
   if (o.scene.verbose) fmt::print(stderr, "{}", plan.text());
   if (!plan.note.empty() && !o.scene.quiet && !o.image.files().empty())
     fmt::print(stderr, "note: nothing is combined: {}\n", plan.note);

@@ -71,6 +71,8 @@ class Integrator {
   virtual std::shared_ptr<const Preparation> prepare(const TransportContext&, const Plan&) const { return nullptr; }
   // `reach` says how light gets to what the camera sees (measured only when integrators are chosen automatically).
   virtual Applies applies(const SceneTraits& traits, const LightReach& reach) const = 0;
+  // Share of the light in view that it cannot find, however long it renders.
+  virtual double misses(const LightReach&) const { return 0; }
   // Of one pass with this plan's window and settings.
   virtual WorkingMemory workingMemory(const Plan&) const { return {}; }
   // Renders pass `request.pass` of the plan's window into the target. Returns false when cancelled.

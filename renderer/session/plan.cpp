@@ -15,10 +15,36 @@ namespace braid {
 
 namespace {
 
+// From this share of the light in view on, what cannot be found is told.
+constexpr double kMissedLight = 0.01;
+
+// Whether some of the light of points and directions may be scattered by mirrors or smooth refraction first.
+bool mayMissLight(const SceneTraits& t) {
+  return t.has(kTraitPointLights | kTraitDirectionalLights) &&
+         t.has(kTraitSpecular | kTraitTransmission | kTraitClearcoat);
+}
+
+void planUnreachable(const LightReach& reach, Plan& plan) {
+  double missed = 1;
+  std::string names;
+  for (const PlannedIntegrator& p : plan.integrators) {
+    missed = std::min(missed, p.integrator->misses(reach));
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", p.integrator->name());
+  }
+  if (plan.integrators.empty() || missed < kMissedLight) return;
+  plan.unreachable = fmt::format(
+      "{:.3g} % of the light in view comes from lights without size over mirrors or through solids that refract, where "
+      "{} cannot find it: --integrator auto can",
+      100 * missed, names);
+  plan.lines.push_back({false, "light out of reach", plan.unreachable});
+}
+
 void planIntegrators(const Scene& scene, const Settings& settings, const std::vector<const Integrator*>& available,
                      Plan& plan) {
   LightReach reach;
-  if (std::find(settings.integrators.begin(), settings.integrators.end(), "auto") != settings.integrators.end())
+  const bool automatic =
+      std::find(settings.integrators.begin(), settings.integrators.end(), "auto") != settings.integrators.end();
+  if (automatic || mayMissLight(scene.traits()))
     reach = measureLightReach(TransportContext(scene, settings.lightStrategy), plan.camera, settings.width,
                               settings.height);
   std::string known;
@@ -41,6 +67,7 @@ void planIntegrators(const Scene& scene, const Settings& settings, const std::ve
     }
     if (!found) throw Error(ExitCode::Usage, "unknown integrator '" + name + "': known are auto, " + known);
   }
+  planUnreachable(reach, plan);
   if (plan.integrators.size() < 2) return;
   // The first one is the headline when nothing combines them. Photons are kept where unbiased images are led by
   // fireflies.
@@ -72,6 +99,8 @@ void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
   part(kTraitVertexColors, "vertex colours", "COLOR_0 multiplies base colours", "no mesh has vertex colours");
   part(kTraitSpecular, "specular lobe", "materials reflect specularly", "every material is perfectly diffuse");
   part(kTraitTransmission, "transmission lobe", "transmissive materials", "no material transmits light");
+  part(kTraitPanes, "shadow rays through panes", "thin smooth transmissive surfaces let light straight through",
+       "no thin smooth transmissive surface");
   part(kTraitVolume, "media tracking", "closed solids refract or attenuate", "no solid with a volume");
   part(kTraitClearcoat, "clearcoat lobe", "clearcoat materials", "no clearcoat");
   part(kTraitSheen, "sheen lobe", "sheen materials", "no sheen");

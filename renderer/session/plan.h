@@ -33,6 +33,9 @@ struct Plan {
   bool lightParts = false;  // of the integrators that separate direct light
   std::vector<PlannedIntegrator> integrators;
   std::vector<PlanLine> lines;
+  // What of the light in view no integrator of the plan can find, and the mend; empty where they find it. The estimated
+  // error of such a render is not known: it does not see what is missing.
+  std::string unreachable;
   size_t filmLine = 0;  // of lines: where those about the film begin
   uint64_t filmBytesPerPixel = 0;
 
