@@ -174,6 +174,9 @@ TEST_CASE("Standard output, devices and FIFOs are written through, and links sta
     CHECK(run.code == 0);
     CHECK((run.out == image));
   }
+  const std::string untilTarget =
+      "render '" + kCornellFile + "' -q --size 16x12 --integrator pt --combine none --error 1e6 ";
+  CHECK(braidRun(folder, untilTarget + "-o -").out.substr(0, 4) == "\x76\x2f\x31\x01");
   Run run = braidRun(folder, plain + "-o - | cat >piped.exr; true");
   CHECK((readText(folder.path / "piped.exr") == image));
   run = braidRun(folder, "preview '" + kCornellFile + "' --http 0 --size 16x12 --spp 4 -o -");

@@ -273,7 +273,8 @@ WrittenImage Publisher::finish() {
     }
   }
   WrittenImage written;
-  if (last_) {
+  // Streams have got nothing yet.
+  if (last_ && options_.image.replaceable().files().size() == options_.image.files().size()) {
     written = *last_;
   } else if (hasImage()) {
     Estimates estimates = describedEstimates(film, session_.plan().settings.quarters, !options_.image.noTiming);
