@@ -236,9 +236,9 @@ TEST_CASE("A preview listens on 127.0.0.1 only, and a taken port is one line and
 TEST_CASE("A preview ends by its limits and by signals, and saves then") {
   const Folder folder;
   const std::string common = "preview '" + kCornellFile + "' --http 0 --size 24x16 ";
-  Run run = braidRun(folder, common + "--spp 3 -o o.exr --png o.png");
+  Run run = braidRun(folder, common + "--spp 4 -o o.exr --png o.png");
   CHECK(run.code == 0);
-  CHECK(contains(run.err, "3 spp in "));
+  CHECK(contains(run.err, "4 spp in "));
   CHECK(contains(run.err, "stopped by samples"));
   const ImageFile saved = readImage(folder.path / "o.exr");
   CHECK(hasLayer(saved, "Error"));

@@ -31,6 +31,7 @@ SweepOptions smallSweep(const Folder& folder) {
   SweepOptions o;
   o.scenes = {test::sourcePath("scenes/cornell.glb")};
   o.output = (folder.path / "sweep").string();
+  o.methods = {"pt"};
   o.spp = "4:16";
   o.seeds = 2;
   o.referenceSpp = 64;
