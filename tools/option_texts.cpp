@@ -16,7 +16,7 @@ namespace {
 constexpr double kLongestDuration = 1e9;  // seconds: 31 years
 constexpr int kMostPixelsASide = 65536;
 
-[[noreturn]] void refuse(const std::string& text, const std::string& expected) {
+[[noreturn]] void refuseText(const std::string& text, const std::string& expected) {
   throw Error(ExitCode::Usage, fmt::format("'{}': expected {}", text, expected));
 }
 
@@ -61,7 +61,7 @@ double parseDuration(const std::string& text) {
     at = next < end && (unit == 'h' || unit == 'm' || unit == 's') ? next + 1 : next;
   }
   if (!valid || !(total <= kLongestDuration))
-    refuse(text, "a duration such as 90, 90s, 2m, 1h or 1h30m, of at most 1e9 seconds");
+    refuseText(text, "a duration such as 90, 90s, 2m, 1h or 1h30m, of at most 1e9 seconds");
   return total;
 }
 
@@ -69,7 +69,7 @@ std::vector<double> parseNumbers(const std::string& text, size_t count, double l
   std::vector<double> numbers;
   bool valid = readNumbers(text, std::string(count - 1, ','), numbers);
   for (const double n : numbers) valid = valid && n >= least && n <= most;
-  if (!valid) refuse(text, fmt::format("{} numbers from {:g} to {:g}, separated by commas", count, least, most));
+  if (!valid) refuseText(text, fmt::format("{} numbers from {:g} to {:g}, separated by commas", count, least, most));
   return numbers;
 }
 
@@ -77,7 +77,8 @@ std::pair<int, int> parseSize(const std::string& text) {
   std::vector<int> size;
   const bool valid = readNumbers(text, "x", size) && size[0] > 0 && size[1] > 0 && size[0] <= kMostPixelsASide &&
                      size[1] <= kMostPixelsASide && int64_t(size[0]) * size[1] <= (int64_t(1) << 28);
-  if (!valid) refuse(text, "WIDTHxHEIGHT such as 1280x720, from 1 to 65536 pixels a side and at most 268435456 in all");
+  if (!valid)
+    refuseText(text, "WIDTHxHEIGHT such as 1280x720, from 1 to 65536 pixels a side and at most 268435456 in all");
   return {size[0], size[1]};
 }
 
@@ -85,7 +86,8 @@ PixelWindow parseWindow(const std::string& text) {
   std::vector<int> n;
   const bool valid = readNumbers(text, ",,,", n) && n[0] >= 0 && n[1] >= 0 && n[0] < n[2] && n[1] < n[3] &&
                      n[2] <= kMostPixelsASide && n[3] <= kMostPixelsASide;
-  if (!valid) refuse(text, "x0,y0,x1,y1: 4 numbers from 0 to 65536, the window's ends (excluded) above its beginnings");
+  if (!valid)
+    refuseText(text, "x0,y0,x1,y1: 4 numbers from 0 to 65536, the window's ends (excluded) above its beginnings");
   return {n[0], n[1], n[2], n[3]};
 }
 
@@ -93,14 +95,14 @@ std::pair<int, int> parsePixel(const std::string& text) {
   std::vector<int> n;
   const bool valid =
       readNumbers(text, ",", n) && n[0] >= 0 && n[1] >= 0 && n[0] < kMostPixelsASide && n[1] < kMostPixelsASide;
-  if (!valid) refuse(text, "X,Y from 0,0 to 65535,65535");
+  if (!valid) refuseText(text, "X,Y from 0,0 to 65535,65535");
   return {n[0], n[1]};
 }
 
 PassInterval parsePasses(const std::string& text) {
   std::vector<uint64_t> n;
   if (!readNumbers(text, ":", n) || n[0] >= n[1] || n[1] > kMaxPass)
-    refuse(text, fmt::format("FIRST:END such as 0:256, passes from 0 to {}, END excluded", kMaxPass));
+    refuseText(text, fmt::format("FIRST:END such as 0:256, passes from 0 to {}, END excluded", kMaxPass));
   return {n[0], n[1]};
 }
 

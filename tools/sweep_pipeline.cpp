@@ -89,7 +89,7 @@ struct Parsed {
   RecipeNeeds needs;
 };
 
-[[noreturn]] void refuse(const std::string& name, const std::string& reason) {
+[[noreturn]] void refuseMethod(const std::string& name, const std::string& reason) {
   throw Error(ExitCode::Usage, fmt::format("--methods: {}: {}", name, reason));
 }
 
@@ -115,7 +115,7 @@ std::vector<const Integrator*> namedIntegrators(const std::string& name, std::st
   if (slash != std::string::npos) list = joinedIntegrators(name.substr(0, slash), integrators);
   method = list.empty() ? name : name.substr(slash + 1);
   if (list.empty() && findIntegrator(integrators, "pt")) list = {findIntegrator(integrators, "pt")};
-  if (list.empty()) refuse(name, "there is no integrator pt: name one before a slash");
+  if (list.empty()) refuseMethod(name, "there is no integrator pt: name one before a slash");
   for (size_t at = method.find('@'); at != std::string::npos; at = method.find('@', at + 1)) {
     const Integrator* i = findIntegrator(integrators, method.substr(at + 1, method.find('@', at + 1) - at - 1));
     if (i && std::find(list.begin(), list.end(), i) == list.end()) list.push_back(i);
@@ -155,7 +155,7 @@ Parsed parse(const std::string& name, const Integrators& integrators) {
   const Recipe recipe = makeRecipe(facts, {parsed.method}, roles);
   const Step* step = recipe.find(parsed.method);
   BRAID_ASSERT(step);
-  if (!step->obstacle.empty()) refuse(name, step->obstacle);
+  if (!step->obstacle.empty()) refuseMethod(name, step->obstacle);
   parsed.needs = needsOf(recipe);
   return parsed;
 }
