@@ -31,7 +31,8 @@ list(FILTER loading_sources INCLUDE REGEX "/test_${loading}[^/]*\\.cpp$")
 if(BRAID_SANITIZE)
   list(FILTER test_sources INCLUDE REGEX "/test_${sanitized}[^/]*\\.cpp$")
   braid_test_program(braid_loading_tests SOURCES ${loading_sources} tests/fuzz/targets.cpp
-                     tools/builtin_scenes.cpp tools/estimates_file.cpp tools/foreign_image.cpp BOXES braid_integrators)
+                     tools/builtin_scenes.cpp tools/estimates_file.cpp tools/foreign_image.cpp tools/same_view.cpp
+                     combiners/exposure.cpp combiners/invalid_pixels.cpp combiners/spatial_variance.cpp BOXES braid_integrators)
   braid_test_program(braid_tests SOURCES ${test_sources} BOXES braid_tools)
 else()
   braid_test_program(braid_tests SOURCES ${test_sources} tests/counted_memory.cpp tests/fuzz/targets.cpp BOXES braid_tools)
