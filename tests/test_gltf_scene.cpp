@@ -72,6 +72,24 @@ TEST_CASE("gltf: a scale of 0 along one axis flattens a mesh, along two leaves i
   CHECK(hasWarning(gone, "a line or a point"));
 }
 
+TEST_CASE("gltf: cameras, lights and meshes beyond what rays reach are left out") {
+  GltfFile file = triangleFile();
+  file.root["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1}, {"znear", 0.1}}}}};
+  file.root["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", "point"}}};
+  const nlohmann::json far = {0, 1e30, 0};
+  file.root["nodes"].push_back({{"camera", 0}, {"translation", far}});
+  file.root["nodes"].push_back({{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}, {"translation", far}});
+  file.root["nodes"].push_back({{"mesh", 0}, {"translation", far}});
+  file.root["scenes"][0]["nodes"] = {0, 1, 2, 3};
+  const SceneData scene = file.load();
+  CHECK(scene.defaultCamera);
+  CHECK(scene.lights.empty());
+  CHECK(scene.instances.size() == 1);
+  CHECK(hasWarning(scene, "the camera is left out"));
+  CHECK(hasWarning(scene, "the light is left out"));
+  CHECK(hasWarning(scene, "endless is left out"));
+}
+
 TEST_CASE("gltf: scenes are chosen, and may be missing") {
   GltfFile file = triangleFile();
   file.root["nodes"].push_back({{"mesh", 0}, {"translation", {5, 0, 0}}});

@@ -13,9 +13,10 @@ namespace {
 
 std::string nodePlace(int node) { return "/nodes/" + std::to_string(node); }
 
-bool isFiniteMatrix(const Mat4& m) {
-  const float* v = glm::value_ptr(m);
-  return std::all_of(v, v + 16, [](float x) { return std::isfinite(x); });
+// Embree ends the program at rays and transforms beyond 1.8e18: places keep away from that, as vertices do.
+bool isWithinReach(const glm::dmat4& m) {
+  const double* v = glm::value_ptr(m);
+  return std::all_of(v, v + 16, [](double x) { return std::abs(x) < 1e17; });
 }
 
 // What makes two uses of a primitive the same triangles.
@@ -123,8 +124,9 @@ class SceneBuilder {
     const glm::dmat3 axes = axesOf(world);
     const glm::dvec3 back = axes[2], up = axes[1];
     const glm::dvec3 side = glm::cross(up, back);
-    if (!(glm::length(side) > 1e-30) || !isFiniteMatrix(Mat4(world))) {
-      document_.report.warn(nodePlace(index), "a camera's node has a singular transform; the camera is left out");
+    if (!(glm::length(side) > 1e-30) || !isWithinReach(world)) {
+      document_.report.warn(nodePlace(index),
+                            "a camera's node has a singular or endless transform; the camera is left out");
       return;
     }
     const glm::dvec3 z = glm::normalize(back), x = glm::normalize(side);
@@ -152,8 +154,9 @@ class SceneBuilder {
     const glm::dmat4& world = pose_.world[static_cast<size_t>(index)];
     const bool isPoint = light.kind == PunctualKind::Point;
     const glm::dvec3 direction = isPoint ? glm::dvec3(0, 0, -1) : -axesOf(world)[2];
-    if (!(glm::length(direction) > 1e-30) || !isFiniteMatrix(Mat4(world))) {
-      document_.report.warn(nodePlace(index), "a light's node has a singular transform; the light is left out");
+    if (!(glm::length(direction) > 1e-30) || !isWithinReach(world)) {
+      document_.report.warn(nodePlace(index),
+                            "a light's node has a singular or endless transform; the light is left out");
       return;
     }
     lights_.emplace_back(world[3]);
@@ -178,11 +181,12 @@ class SceneBuilder {
       budget(2 * instanceCount(document_, instancing) * sizeof(glm::dmat4));
       for (const glm::dmat4& local : instanceTransforms(document_, instancing)) {
         const glm::dmat4 toWorld = pose_.world[static_cast<size_t>(index)] * local;
-        if (shapeOf(toWorld) != Shape::Gone && isFiniteMatrix(Mat4(toWorld))) {
+        if (shapeOf(toWorld) != Shape::Gone && isWithinReach(toWorld)) {
           placed.emplace_back(toWorld);
         } else {
-          document_.report.warn(nodePlace(index),
-                                "a mesh that its transform makes a line or a point (a scale of 0) is left out");
+          document_.report.warn(
+              nodePlace(index),
+              "a mesh that its transform makes a line or a point (a scale of 0) or endless is left out");
         }
       }
     }
