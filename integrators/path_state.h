@@ -3,7 +3,7 @@
 #pragma once
 
 #include "renderer/core/sampler.h"
-#include "renderer/transport/bsdf.h"
+#include "renderer/transport/bsdf/bsdf.h"
 #include "renderer/transport/hit.h"
 #include "renderer/transport/media.h"
 

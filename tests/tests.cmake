@@ -19,23 +19,23 @@ function(braid_test_program name)
   endif()
 endfunction()
 set_source_files_properties(tests/main.cpp PROPERTIES SKIP_PRECOMPILE_HEADERS ON)  # it implements doctest
-set_source_files_properties(tests/main.cpp tests/counted_memory.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+set_source_files_properties(tests/main.cpp tests/support/counted_memory.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 
 # What also runs under sanitizers, where long statistics would take too long; nothing else is built there. What reads
 # strangers' files and renders them shortly is a program of its own, that needs neither combiners nor command line.
 set(loading "(gltf|fuzz|texture|film|exr|state|registry|scene)")
-set(sanitized "(metrics|cli|pw|combiner_stability|unknown_bias|photon_map_shrinkage|lone_outliers|own_halves|second_pass)")
-file(GLOB test_sources CONFIGURE_DEPENDS tests/test_*.cpp)
+set(sanitized "(metrics|cli|pw|combiner_stability|cross_half_bias|photon_map_shrinkage|lone_fireflies|own_halves|refilter)")
+file(GLOB_RECURSE test_sources CONFIGURE_DEPENDS tests/test_*.cpp)
 set(loading_sources ${test_sources})
 list(FILTER loading_sources INCLUDE REGEX "/test_${loading}[^/]*\\.cpp$")
 if(BRAID_SANITIZE)
   list(FILTER test_sources INCLUDE REGEX "/test_${sanitized}[^/]*\\.cpp$")
   braid_test_program(braid_loading_tests SOURCES ${loading_sources} tests/fuzz/targets.cpp
-                     tools/builtin_scenes.cpp tools/estimates_file.cpp tools/foreign_image.cpp tools/same_view.cpp
-                     combiners/exposure.cpp combiners/invalid_pixels.cpp combiners/spatial_variance.cpp BOXES braid_integrators)
+                     tools/bench/builtin_scenes.cpp tools/images/estimates_file.cpp tools/images/foreign_image.cpp tools/images/same_view.cpp
+                     combiners/pipeline/exposure.cpp combiners/pipeline/invalid_pixels.cpp combiners/pipeline/spatial_variance.cpp BOXES braid_integrators)
   braid_test_program(braid_tests SOURCES ${test_sources} BOXES braid_tools)
 else()
-  braid_test_program(braid_tests SOURCES ${test_sources} tests/counted_memory.cpp tests/fuzz/targets.cpp BOXES braid_tools)
+  braid_test_program(braid_tests SOURCES ${test_sources} tests/support/counted_memory.cpp tests/fuzz/targets.cpp BOXES braid_tools)
 endif()
 add_dependencies(braid_tests braid)
 # One ctest per file. What counts errors over many images meets nothing under sanitizers that other cases do not.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The mean over 15x15 pixels: the severely biased input that combiners are tested with. It blurs every edge and texture
 // and spreads every firefly, so a combiner that trusts it shows at once.
-#include "combiners/box_mean.h"
-#include "combiners/registry.h"
+#include "combiners/pixels/box_mean.h"
+#include "combiners/pipeline/registry.h"
 
 namespace braid {
 

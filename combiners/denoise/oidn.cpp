@@ -13,8 +13,8 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 
-#include "combiners/outside_method.h"
-#include "combiners/registry.h"
+#include "combiners/pipeline/external_method.h"
+#include "combiners/pipeline/registry.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 
@@ -108,7 +108,7 @@ Rgb<float> Device::denoise(const Rgb<float>& colour, const Rgb<float>* albedo, c
   return out;
 }
 
-class Oidn : public OutsideMethod {
+class Oidn : public ExternalMethod {
  public:
   Oidn(const OidnApi* api, std::string reason) : api_(api), reason_(std::move(reason)) {}
   const char* name() const override { return "oidn"; }
@@ -123,7 +123,7 @@ class Oidn : public OutsideMethod {
   }
   // The library's own memory is not known.
   MethodMemory memory(const MemoryCase& /*of*/) const override { return {96, 36}; }
-  std::string obstacle() const override { return api_ ? "" : reason_; }
+  std::string skipReason() const override { return api_ ? "" : reason_; }
 
   // A half is denoised with that half of the features, so that it stays independent of the other one.
   MethodResult run(const MethodInputs& in) const override {

@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "renderer/film/combiner.h"
+#include "combiners/method.h"
 
 namespace braid {
 

@@ -27,7 +27,7 @@ struct EstimateHead {
 };
 
 // Mean, halves and variance of the mean of a part of an estimate's light.
-struct LightPart {
+struct DirectLight {
   Rgb<float> mean, half[2], variance;
 };
 
@@ -43,7 +43,7 @@ struct Estimate : EstimateHead {
   // Of integrators that tell two parts of the light apart, where these are kept; else empty. Direct light comes
   // straight from lights to the first non-specular vertex of the camera's path, or to the camera, there perhaps by
   // specular vertices. The rest is indirect: mean and halves are differences, only the variance is not.
-  LightPart direct;
+  DirectLight direct;
   Rgb<float> indirectVariance;
 };
 

@@ -80,8 +80,7 @@ Plane<float> FeatureAccumulator::variance(int component) const {
   const Plane<double>& a = sum_[0][c];
   Plane<float> out(a.width, a.height, kUnfilled);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i)
-      out[i] = floatVarianceOfMean(a[i] + sum_[1][c][i], sumsq_[c][i], passes());
+    for (size_t i = begin; i < end; ++i) out[i] = floatVarianceOfMean(a[i] + sum_[1][c][i], sumsq_[c][i], passes());
   });
   return out;
 }

@@ -79,7 +79,7 @@ class PassTarget {
   friend class Accumulator;
   friend class FeatureAccumulator;
   friend class CoverageAccumulator;
-  friend class LightPartsAccumulator;
+  friend class DirectLightAccumulator;
 
   int width_, height_;
   Rgb<float> own_;

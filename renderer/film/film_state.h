@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "renderer/film/estimates.h"
-#include "renderer/film/light_parts.h"
+#include "renderer/film/direct_light.h"
 
 namespace braid {
 
@@ -32,7 +32,7 @@ struct EstimateState {
   std::vector<PassInterval> passes;  // disjoint, ascending, not touching
   double seconds = 0;
   Accumulator sums{0, 0, 2};
-  std::optional<LightPartsAccumulator> parts;  // where direct light is kept by itself
+  std::optional<DirectLightAccumulator> parts;  // where direct light is kept by itself
   std::vector<Checkpoint> history;
 
   uint64_t firstPass() const { return passes.empty() ? 0 : passes.front().begin; }

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "renderer/core/vec.h"
-#include "renderer/scene/material.h"
-#include "renderer/scene/scene_data.h"
+#include "renderer/scene/data/material.h"
+#include "renderer/scene/data/scene_data.h"
 
 #if __has_include(<embree4/rtcore.h>)
 #include <embree4/rtcore.h>

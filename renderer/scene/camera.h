@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "renderer/core/vec.h"
-#include "renderer/scene/scene_data.h"
+#include "renderer/scene/data/scene_data.h"
 
 namespace braid {
 

@@ -2,7 +2,7 @@
 // Tells closed surfaces from open ones.
 #pragma once
 
-#include "renderer/scene/scene_data.h"
+#include "renderer/scene/data/scene_data.h"
 
 namespace braid {
 

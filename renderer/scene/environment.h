@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "renderer/core/vec.h"
-#include "renderer/scene/scene_data.h"
+#include "renderer/scene/data/scene_data.h"
 
 namespace braid {
 

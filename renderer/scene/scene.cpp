@@ -9,7 +9,7 @@
 #include "renderer/core/parallel.h"
 #include "renderer/core/stopwatch.h"
 #include "renderer/scene/closed_mesh.h"
-#include "renderer/scene/placement.h"
+#include "renderer/scene/data/placement.h"
 
 namespace braid {
 

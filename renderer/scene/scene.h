@@ -10,9 +10,9 @@
 
 #include "renderer/scene/accel.h"
 #include "renderer/scene/coincident.h"
-#include "renderer/scene/emitters.h"
+#include "renderer/scene/data/emitters.h"
 #include "renderer/scene/environment.h"
-#include "renderer/scene/scene_data.h"
+#include "renderer/scene/data/scene_data.h"
 #include "renderer/scene/traits.h"
 
 namespace braid {

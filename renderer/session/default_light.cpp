@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "renderer/scene/scene_defaults.h"
+#include "renderer/scene/data/scene_defaults.h"
 #include "renderer/transport/light_reach.h"
 #include "renderer/transport/lit_share.h"
 

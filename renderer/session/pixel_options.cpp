@@ -54,7 +54,7 @@ std::vector<StateOption> pixelOptions(const Plan& plan) {
       {"keeping quarters", yesOrNo(plan.buckets == 4)},
       {"keeping features", yesOrNo(plan.features)},
       {"keeping history", yesOrNo(s.history)},
-      {"keeping direct light", yesOrNo(plan.lightParts)}};
+      {"keeping direct light", yesOrNo(plan.directIndirect)}};
   for (StateOption& stop : stopOptions(s.stops)) list.push_back(std::move(stop));
   return list;
 }

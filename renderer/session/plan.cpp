@@ -141,18 +141,18 @@ void planFilm(Plan& plan) {
   }
   const auto separate = std::count_if(plan.integrators.begin(), plan.integrators.end(),
                                       [](const auto& p) { return p.integrator->separatesDirectLight(); });
-  plan.lightParts = separate > 0 && (settings.lightParts || settings.full);
-  if (plan.lightParts) plan.filmBytesPerPixel += (accumulator + 24) * static_cast<uint64_t>(separate) + 12;
+  plan.directIndirect = separate > 0 && (settings.directIndirect || settings.full);
+  if (plan.directIndirect) plan.filmBytesPerPixel += (accumulator + 24) * static_cast<uint64_t>(separate) + 12;
   plan.lines.push_back(
       {plan.buckets == 4, "quarter buckets",
        plan.buckets == 4 ? "for outputs or combiners" : "no output or combiner reads quarters: two half buffers"});
   plan.lines.push_back({plan.features, "features",
                         plan.features ? "albedo, normal, depth, visibility for outputs or combiners"
                                       : "no output or combiner reads them"});
-  plan.lines.push_back({plan.lightParts, "direct light by itself",
-                        plan.lightParts ? "for outputs or combiners"
-                        : separate == 0 ? "no integrator tells it from the rest"
-                                        : "no output or combiner reads it"});
+  plan.lines.push_back({plan.directIndirect, "direct light by itself",
+                        plan.directIndirect ? "for outputs or combiners"
+                        : separate == 0     ? "no integrator tells it from the rest"
+                                            : "no output or combiner reads it"});
   plan.lines.push_back({settings.history, "history",
                         settings.history ? fmt::format("variances after rounds 1, 2, 4, ...: {} bytes a pixel each",
                                                        12 * plan.integrators.size())
@@ -198,7 +198,7 @@ void keepAlso(const FilmNeeds& needs, Plan& plan) {
   s.quarters |= needs.quarters;
   s.features |= needs.features;
   s.history |= needs.history;
-  s.lightParts |= needs.lightParts;
+  s.directIndirect |= needs.directIndirect;
   s.stops.insert(s.stops.end(), needs.stops.begin(), needs.stops.end());
   std::sort(s.stops.begin(), s.stops.end());
   s.stops.erase(std::unique(s.stops.begin(), s.stops.end()), s.stops.end());

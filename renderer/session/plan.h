@@ -30,7 +30,7 @@ struct Plan {
   PixelWindow window;
   int buckets = 2;
   bool features = true;
-  bool lightParts = false;  // of the integrators that separate direct light
+  bool directIndirect = false;  // of the integrators that separate direct light
   std::vector<PlannedIntegrator> integrators;
   std::vector<PlanLine> lines;
   // What of the light in view no integrator of the plan can find, and the mend; empty where they find it. The estimated
@@ -55,7 +55,7 @@ Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& sett
 
 // What readers of the estimates need kept. Stops: numbers of passes after which the image is kept.
 struct FilmNeeds {
-  bool quarters = false, features = false, history = false, lightParts = false;
+  bool quarters = false, features = false, history = false, directIndirect = false;
   std::vector<uint64_t> stops;
 };
 // Keeps these as well: the plan that makePlan() would give for such settings, without another look at the scene.

@@ -24,7 +24,7 @@ PassTarget makeTarget(const Plan& plan) {
     bias = bias || p.integrator->estimatesBias();
   }
   return PassTarget(plan.window.width(), plan.window.height(), splats, plan.features, plan.settings.transparent, bias,
-                    plan.lightParts);
+                    plan.directIndirect);
 }
 
 }  // namespace
@@ -171,7 +171,7 @@ Session::Session(const Scene& scene, Plan plan)
     e.lowDiscrepancy = p.integrator->lowDiscrepancy(plan_.settings);
     e.passesPerRound = p.passesPerRound;
     e.sums = Accumulator(width, height, plan_.buckets, p.integrator->estimatesBias());
-    if (plan_.lightParts && p.integrator->separatesDirectLight()) e.parts.emplace(width, height, plan_.buckets);
+    if (plan_.directIndirect && p.integrator->separatesDirectLight()) e.parts.emplace(width, height, plan_.buckets);
     film_.estimates.push_back(std::move(e));
   }
   if (plan_.features) film_.features.emplace(width, height);

@@ -9,7 +9,7 @@
 
 #include "renderer/core/sampler.h"
 #include "renderer/film/film.h"
-#include "renderer/transport/light_sampler.h"
+#include "renderer/transport/lights/light_sampler.h"
 
 namespace braid {
 
@@ -29,7 +29,7 @@ struct Settings {
   LightStrategy lightStrategy = LightStrategy::Automatic;
   bool features = true;  // albedo, normal, depth, visibility
   bool quarters = false;
-  bool lightParts = false;             // direct light by itself, of integrators that can tell it
+  bool directIndirect = false;         // direct light by itself, of integrators that can tell it
   bool history = false;                // variances after rounds 1, 2, 4, …
   std::vector<uint64_t> stops;         // passes, rising: the first of these rounds with as many keeps its image as well
   bool transparent = false;            // camera rays that miss: no radiance, alpha 0

@@ -7,7 +7,7 @@
 
 #include "renderer/scene/scene.h"
 #include "renderer/transport/hit.h"
-#include "renderer/transport/light_sampler.h"
+#include "renderer/transport/lights/light_sampler.h"
 
 namespace braid {
 

@@ -5,7 +5,7 @@
 
 #include "renderer/core/vec.h"
 #include "renderer/scene/scene.h"
-#include "renderer/transport/surface.h"
+#include "renderer/transport/bsdf/surface.h"
 
 namespace braid {
 

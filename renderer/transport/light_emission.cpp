@@ -5,7 +5,7 @@
 
 #include "renderer/core/parallel.h"
 #include "renderer/transport/hit.h"
-#include "renderer/transport/warp.h"
+#include "renderer/transport/bsdf/warp.h"
 
 namespace braid {
 

@@ -6,7 +6,7 @@
 
 #include <vector>
 
-#include "renderer/transport/light_sampler.h"
+#include "renderer/transport/lights/light_sampler.h"
 #include "renderer/transport/media.h"
 
 namespace braid {

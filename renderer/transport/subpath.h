@@ -19,7 +19,7 @@
 #include "renderer/core/error.h"
 #include "renderer/core/sampler.h"
 #include "renderer/scene/camera.h"
-#include "renderer/transport/bsdf.h"
+#include "renderer/transport/bsdf/bsdf.h"
 #include "renderer/transport/context.h"
 #include "renderer/transport/light_emission.h"
 #include "renderer/transport/roulette.h"

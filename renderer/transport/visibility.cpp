@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/transport/visibility.h"
 
-#include "renderer/transport/bsdf.h"
+#include "renderer/transport/bsdf/bsdf.h"
 
 namespace braid {
 

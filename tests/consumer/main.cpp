@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <string>
 
-#include <integrators/braid.h>
+#include <braid/braid.h>
 
 namespace {
 

@@ -11,12 +11,12 @@
 
 #include <fmt/format.h>
 
-#include "integrators/braid.h"
+#include "braid/braid.h"
 #include "renderer/core/hash.h"
-#include "renderer/film/state_file.h"
-#include "renderer/scene/gltf.h"
-#include "renderer/scene/texture.h"
-#include "tools/estimates_file.h"
+#include "renderer/film/files/state_file.h"
+#include "renderer/scene/data/gltf.h"
+#include "renderer/scene/data/texture.h"
+#include "tools/images/estimates_file.h"
 
 namespace braid::fuzz {
 

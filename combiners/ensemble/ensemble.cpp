@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// Ensemble denoising: the mean of several denoised images with the weights that minimise its squared error, estimated
+// from two halves of the samples ("Ensemble Denoising for Monte Carlo Renderings"). It is consistent as soon as one of
+// the bases is. Weights are solved per pixel and channel and then smoothed (combiners/ensemble/ensemble_weights.h and
+// combiners/ensemble/weight_bilateral.h); the halves of the result are the halves of the bases with the same weights.
+#include <algorithm>
+
+#include "combiners/statistics/half_statistics.h"
+#include "combiners/pipeline/combine_plan.h"
+#include "combiners/pipeline/registry.h"
+#include "combiners/ensemble/relative_weights.h"
+#include "combiners/ensemble/weight_bilateral.h"
+
+namespace braid {
+
+namespace {
+
+const OptionInfo kPatch{"ensemble-patch", 7, "Width in pixels of the patches that errors are summed over; 1: the paper",
+                        1, 101};
+const OptionInfo kFilter{"ensemble-filter", 1, "1: smooth the weights by a cross bilateral filter; 0: do not"};
+const OptionInfo kShared{"ensemble-shared", 0, "1: the same weights for all channels; 0: weights per channel"};
+const OptionInfo kNonNegative{"ensemble-non-negative", 1, "0: weights may be negative, which makes fireflies"};
+const OptionInfo kFullError{"ensemble-full-error", 0, "1: errors of the whole images in place of those of the halves"};
+
+const OptionInfo kRelative{
+    "ensemble-relative", 1,
+    "1: errors relative to the brightness of the unbiased image, as relL2 counts them; 0: the paper's"};
+
+const OptionInfo kPrior{"ensemble-prior",
+                        6,
+                        "Pull of noise towards equal weights: 6 for weights that may be anything; 0: the paper's",
+                        0,
+                        1e6,
+                        false};
+
+constexpr double kImprovement = 1e-4;  // a hundredth of it changes errors by 1e-5 and takes 1.15x as long
+
+// Fewer passes leave too few in each half to tell the bases apart.
+constexpr uint64_t kFewestPasses = 8;
+
+class Ensemble : public Method {
+ public:
+  const char* name() const override { return "ensemble"; }
+  const char* description() const override { return "Mean of several denoised images with optimised weights"; }
+  MethodKind kind() const override { return MethodKind::Combiner; }
+  Needs needs() const override {
+    Needs needs;
+    needs.bases = 2;
+    needs.features = true;
+    needs.variance = false;
+    return needs;
+  }
+  MethodMemory memory(const MemoryCase& of) const override {
+    const bool quarters = of.passes == 0 || of.passes >= 4;
+    return {quarters ? 50 + 23 * of.bases : 72 + 4 * of.bases, 40 + 4 * of.bases};
+  }
+  std::vector<OptionInfo> options() const override {
+    return {kPatch, kFilter, kShared, kNonNegative, kFullError, kRelative, kPrior};
+  }
+  MethodResult run(const MethodInputs& in) const override;
+};
+
+EnsembleChoices choicesOf(const MethodOptions& options) {
+  EnsembleChoices choices;
+  choices.improvement = kImprovement;
+  choices.patchRadius = static_cast<int>(std::clamp(options.number(kPatch), 1.0, 101.0)) / 2;
+  choices.shared = options.number(kShared) != 0;
+  choices.nonNegative = options.number(kNonNegative) != 0;
+  choices.fullError = options.number(kFullError) != 0;
+  choices.prior = std::max(0.0, options.number(kPrior));
+  return choices;
+}
+
+Attribute remark(const char* name, const std::string& text) {
+  Attribute a;
+  a.name = name;
+  a.text = text;
+  return a;
+}
+
+MethodResult Ensemble::run(const MethodInputs& in) const {
+  MethodResult result;
+  EnsembleChoices choices = choicesOf(in.options);
+  Plane<float> roots;
+  if (in.options.number(kRelative) != 0) {
+    roots = relativeErrorRoots(in.unbiased->mean, meanVariance(*in.unbiased));
+    choices.rootWeights = &roots;
+  }
+  const uint64_t passes = in.unbiased->passes;
+  WeightMaps weights;
+  if (passes > 0 && passes < kFewestPasses) {
+    weights = uniformWeights(in.bases.size(), 1, in.unbiased->mean.width(), in.unbiased->mean.height());
+    result.remarks.push_back(remark("weights", "equal, for there are fewer than 8 passes"));
+  } else {
+    weights = ensembleWeights(*in.unbiased, in.bases, choices);
+    if (in.options.number(kFilter) != 0)
+      weights = filteredWeights(weights, weightedEstimate(weights, in.bases), in.features);
+  }
+  result.image = weightedEstimate(weights, in.bases);
+  result.error = errorMap(result.image.half, *in.unbiased, meanVariance(*in.unbiased), result.image.mean);
+  std::vector<Plane<float>> maps = channelMeans(weights);
+  for (size_t b = 0; b < in.bases.size(); ++b) {
+    const std::string& base = in.bases[b]->name;
+    result.aovs.push_back(
+        {"weight.ensemble." + (base.empty() ? std::to_string(b) : layerName(base)), std::move(maps[b])});
+    if (in.bases[b]->unbiased)
+      result.remarks.push_back(remark("warning", "the unbiased image as a base makes the ensemble much worse"));
+  }
+  return result;
+}
+
+}  // namespace
+
+std::unique_ptr<Method> make_ensemble() { return std::make_unique<Ensemble>(); }
+
+}  // namespace braid

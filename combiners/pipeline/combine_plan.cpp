@@ -1,0 +1,412 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combiners/pipeline/combine_plan.h"
+
+#include <algorithm>
+#include <bit>
+#include <charconv>
+#include <filesystem>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "combiners/pipeline/denoise_cutoff.h"
+#include "combiners/pipeline/external_method.h"
+#include "combiners/pipeline/registry.h"
+#include "renderer/core/error.h"
+#include "renderer/core/hash.h"
+
+namespace braid {
+
+namespace {
+
+// Best first: the learned one, the regressions, then the non-local filters by their error on the synthetic scenes of
+// tests.
+constexpr const char* kPreferredDenoisers[] = {"oidn", "nfor", "rdfc", "pw", "nlm"};
+// Severely biased on purpose; never chosen by itself.
+constexpr const char* kStressInput = "box";
+
+// "name@biased" cut at the first '@' that is no part of a parameter, which a number never has.
+std::pair<std::string, std::string> splitChain(const std::string& name) {
+  const size_t at = name.find('@'), colon = name.find(':');
+  if (at == std::string::npos) return {name, ""};
+  if (colon < at && name.find_first_not_of("0123456789", colon + 1) != at) return {name, ""};
+  return {name.substr(0, at), name.substr(at + 1)};
+}
+
+std::vector<std::string> splitAtPlus(const std::string& text) {
+  std::vector<std::string> parts;
+  for (size_t begin = 0, end = 0; end != std::string::npos; begin = end + 1) {
+    end = text.find('+', begin);
+    parts.push_back(text.substr(begin, end == std::string::npos ? end : end - begin));
+  }
+  return parts;
+}
+
+std::string plural(uint64_t count, const char* noun, const char* nouns) {
+  return fmt::format("{} {}", count, count == 1 ? noun : nouns);
+}
+
+class CombinePlanner {
+ public:
+  CombinePlanner(const AvailableEstimates& available, const CombinePlanOptions& options)
+      : available_(available), options_(options) {}
+
+  // Adds the steps of a method, or reports that the name is an estimate's. Returns why it cannot be an input.
+  std::string add(const std::string& name);
+  // Takes out the denoisers of newest images that only stopped methods asked for.
+  void dropReplaced(const std::vector<std::string>& wanted);
+
+  CombinePlan combinePlan;
+
+ private:
+  void fill(Step& step, const std::string& chosen);
+  std::string fillUnbiased(Step& step);
+  std::string fillCorrelated(Step& step);
+  std::string fillBiased(Step& step, const std::string& chosen);
+  std::string fillBases(Step& step, const std::string& chosen);
+  bool readsDirectIndirect(const Step& step) const;
+  void fillStop(Step& step);
+  std::string defaultBiased(const Step& step, const Needs& needs);
+  std::vector<std::string> denoisersInOrder() const;
+  std::string lacks(const std::string& estimate, const Needs& needs, bool unbiased) const;
+
+  const AvailableEstimates& available_;
+  const CombinePlanOptions& options_;
+  std::set<std::string> inProgress_, replaced_;
+};
+
+std::string CombinePlanner::add(const std::string& name) {
+  if (available_.find(name)) return {};
+  if (const Step* done = combinePlan.find(name)) return done->skipReason;
+  if (!inProgress_.insert(name).second) return fmt::format("{} would be its own input", name);
+  Step step;
+  step.name = name;
+  const auto [method, chosen] = splitChain(name);
+  step.method = findMethod(method);
+  fill(step, chosen);
+  inProgress_.erase(name);
+  const std::string skipReason = step.skipReason;
+  combinePlan.steps.push_back(std::move(step));
+  return skipReason;
+}
+
+void CombinePlanner::fill(Step& step, const std::string& chosen) {
+  const Needs needs = step.method->needs();
+  const bool takesBases = needs.bases > 0 || needs.anyBases;
+  if (const auto* outside = dynamic_cast<const ExternalMethod*>(step.method.get()))
+    step.skipReason = outside->skipReason();
+  if (step.skipReason.empty()) step.skipReason = fillUnbiased(step);
+  if (step.skipReason.empty() && needs.reference && !available_.reference)
+    step.skipReason = "needs a reference: combine --reference FILE, or a sweep";
+  if (step.skipReason.empty() && needs.correlated) step.skipReason = fillCorrelated(step);
+  if (step.skipReason.empty() && needs.biased) step.skipReason = fillBiased(step, chosen);
+  if (step.skipReason.empty() && !needs.biased && !takesBases && !chosen.empty())
+    step.skipReason = "it takes no biased input";
+  if (step.skipReason.empty() && takesBases) step.skipReason = fillBases(step, needs.biased ? "" : chosen);
+  if (step.skipReason.empty()) fillStop(step);
+  step.directIndirect = step.skipReason.empty() && readsDirectIndirect(step);
+}
+
+// What an estimate lacks for the needs, or nothing.
+std::string CombinePlanner::lacks(const std::string& name, const Needs& needs, bool unbiased) const {
+  const AvailableEstimate* e = available_.find(name);
+  if (!e) return {};
+  if (needs.halves && !e->halves) return fmt::format("needs the halves of {}", name);
+  if (!unbiased) return {};
+  if (needs.variance && !e->variance) return fmt::format("needs the variance of {}", name);
+  if (e->passes > 0 && e->passes < needs.passes)
+    return fmt::format("needs {} of {}, which has {}", plural(needs.passes, "pass", "passes"), name, e->passes);
+  if (needs.quarters && !e->quarters) return fmt::format("needs the quarter buffers of {}", name);
+  if (e->checkpoints < needs.checkpoints)
+    return fmt::format("needs {} of {}, which has {}",
+                       plural(static_cast<uint64_t>(needs.checkpoints), "checkpoint", "checkpoints"), name,
+                       e->checkpoints);
+  return {};
+}
+
+std::string CombinePlanner::fillUnbiased(Step& step) {
+  step.unbiased = options_.unbiased.empty() ? defaultUnbiased(available_) : options_.unbiased;
+  if (step.unbiased.empty()) return "needs an unbiased estimate with independent pixels";
+  if (!available_.find(step.unbiased))
+    return fmt::format("needs the unbiased estimate {}, which there is not", step.unbiased);
+  return lacks(step.unbiased, step.method->needs(), true);
+}
+
+std::string CombinePlanner::fillCorrelated(Step& step) {
+  step.correlated = options_.correlated;
+  if (step.correlated.empty())
+    for (const AvailableEstimate& e : available_.estimates)
+      if (e.unbiased && e.correlation != Correlation::Independent) {
+        step.correlated = e.name;
+        break;
+      }
+  if (step.correlated.empty()) return "needs an estimate with correlated pixels, such as crn";
+  const AvailableEstimate* e = available_.find(step.correlated);
+  if (!e) return fmt::format("needs the correlated estimate {}, which there is not", step.correlated);
+  const Needs needs = step.method->needs();
+  if (needs.halves && !e->halves) return fmt::format("needs the halves of {}", e->name);
+  if (needs.quarters && !e->quarters) return fmt::format("needs the quarter buffers of {}", e->name);
+  return {};
+}
+
+std::vector<std::string> CombinePlanner::denoisersInOrder() const {
+  std::vector<std::string> registered, list;
+  for (const auto& m : makeMethods())
+    if (m->kind() == MethodKind::Denoiser && std::string(m->name()) != kStressInput) registered.push_back(m->name());
+  for (const char* name : kPreferredDenoisers)
+    if (std::count(registered.begin(), registered.end(), name)) list.push_back(name);
+  for (const std::string& name : registered)
+    if (!std::count(list.begin(), list.end(), name)) list.push_back(name);
+  return list;
+}
+
+std::string CombinePlanner::defaultBiased(const Step& step, const Needs& needs) {
+  for (const std::string& name : options_.denoisers)
+    if (add(name).empty()) return name;
+  if (!needs.redenoise)
+    for (const AvailableEstimate& e : available_.estimates)
+      if (!e.unbiased && e.name != step.unbiased && lacks(e.name, needs, false).empty()) return e.name;
+  for (const std::string& name : denoisersInOrder()) {
+    // A trial that leaves no trace of what does not run.
+    CombinePlanner trial(available_, options_);
+    if (trial.add(name).empty() && add(name).empty()) return name;
+  }
+  return {};
+}
+
+std::string CombinePlanner::fillBiased(Step& step, const std::string& chosen) {
+  const Needs needs = step.method->needs();
+  step.biased = chosen;
+  if (step.biased.empty() && !inProgress_.count(options_.biased)) step.biased = options_.biased;
+  if (step.biased.empty()) step.biased = defaultBiased(step, needs);
+  if (step.biased.empty())
+    return needs.redenoise ? "needs a denoiser that can run, for its biased input"
+                           : "needs a biased input: a denoiser that can run or a biased estimate";
+  const std::string skipReason = add(step.biased);
+  if (!skipReason.empty()) return fmt::format("needs {}, which cannot run: {}", step.biased, skipReason);
+  const Step* made = combinePlan.find(step.biased);
+  if (needs.redenoise && (!made || made->method->kind() != MethodKind::Denoiser))
+    return fmt::format("needs a denoiser that it can run again as its biased input; {} is none", step.biased);
+  return lacks(step.biased, needs, false);
+}
+
+std::string CombinePlanner::fillBases(Step& step, const std::string& chosen) {
+  const Needs needs = step.method->needs();
+  std::vector<std::string> candidates = chosen.empty() ? options_.bases : splitAtPlus(chosen);
+  std::string refused;
+  const auto keep = [&](const std::string& name) {
+    std::string skipReason = add(name);
+    if (skipReason.empty()) skipReason = lacks(name, needs, false);
+    if (skipReason.empty())
+      step.bases.push_back(name);
+    else
+      refused += fmt::format("; {}: {}", name, skipReason);
+  };
+  if (!candidates.empty()) {
+    for (const std::string& name : candidates) keep(name);
+    if (!refused.empty()) return "cannot have all of the bases named" + refused;
+  } else {
+    for (const std::string& name : options_.denoisers) keep(name);
+    if (static_cast<int>(step.bases.size()) < needs.bases)
+      for (const std::string& name : denoisersInOrder()) {
+        if (std::count(step.bases.begin(), step.bases.end(), name)) continue;
+        CombinePlanner trial(available_, options_);
+        if (trial.add(name).empty()) keep(name);
+      }
+  }
+  if (needs.anyBases)
+    for (const AvailableEstimate& e : available_.estimates)
+      if (!e.unbiased && e.name != step.unbiased && !std::count(step.bases.begin(), step.bases.end(), e.name))
+        keep(e.name);
+  if (static_cast<int>(step.bases.size()) < needs.bases)
+    return fmt::format("needs {} to choose from, there {}", plural(static_cast<uint64_t>(needs.bases), "base", "bases"),
+                       step.bases.size() == 1 ? "is only " + step.bases[0] : fmt::format("are {}", step.bases.size()));
+  return {};
+}
+
+bool CombinePlanner::readsDirectIndirect(const Step& step) const {
+  const AvailableEstimate* e = available_.find(step.unbiased);
+  return step.method->needs().directIndirectHelps && e && e->directIndirect &&
+         std::none_of(step.bases.begin(), step.bases.end(), [&](const std::string& name) {
+           const AvailableEstimate* base = available_.find(name);
+           return base && base->bias;
+         });
+}
+
+void CombinePlanner::fillStop(Step& step) {
+  const auto* stopping = dynamic_cast<const StoppingMethod*>(step.method.get());
+  if (!stopping) return;
+  step.stop = stopping->stop() > 0 ? stopping->stop() : options_.stop;
+  const AvailableEstimate* e = available_.find(step.unbiased);
+  const Step* newest = combinePlan.find(step.biased);
+  if (step.stop == 0 || !e || !newest || newest->unbiased != step.unbiased) return;
+  const auto kept = std::lower_bound(e->kept.begin(), e->kept.end(), step.stop);
+  if (kept == e->kept.end()) {
+    if (e->passes > std::bit_ceil(step.stop))
+      step.note = fmt::format("denoises the newest image: that of {} after {} passes was not kept", e->name, step.stop);
+    return;
+  }
+  if (*kept >= e->passes) return;  // it is the newest
+  Step earlier = *newest;
+  earlier.name = fmt::format("{}-stop{}", newest->name, *kept);
+  earlier.kept = step.kept = *kept;
+  replaced_.insert(newest->name);
+  step.biased = earlier.name;
+  if (!combinePlan.find(earlier.name)) combinePlan.steps.push_back(std::move(earlier));
+}
+
+void CombinePlanner::dropReplaced(const std::vector<std::string>& wanted) {
+  for (const std::string& name : wanted) replaced_.erase(name);
+  for (const std::string& name : options_.denoisers) replaced_.erase(name);
+  for (const Step& step : combinePlan.steps) {
+    replaced_.erase(step.biased);
+    for (const std::string& base : step.bases) replaced_.erase(base);
+  }
+  std::erase_if(combinePlan.steps, [&](const Step& step) { return replaced_.count(step.name) > 0; });
+}
+
+// Estimates of a file that earlier runs of methods made give way to the methods of their names.
+AvailableEstimates withoutMethods(const AvailableEstimates& available) {
+  AvailableEstimates kept = available;
+  std::erase_if(kept.estimates, [](const AvailableEstimate& e) { return isMethod(e.name); });
+  return kept;
+}
+
+// The method for what follows the colon.
+std::unique_ptr<Method> withStop(const StoppingMethod& method, const std::string& full, size_t begin) {
+  uint64_t passes = 0;
+  const char *at = full.data() + begin, *end = full.data() + full.size();
+  const auto [next, error] = std::from_chars(at, end, passes);
+  if (at == end || error != std::errc() || next != end || passes == 0)
+    throw Error(ExitCode::Usage, fmt::format("{}: expected {}:PASSES, after which denoising stops, such as {}:128",
+                                             full, method.name(), method.name()));
+  return method.stoppedAfter(passes);
+}
+
+std::string knownMethods() {
+  std::string known;
+  for (const auto& m : makeMethods()) known += fmt::format("{}{}", known.empty() ? "" : ", ", m->name());
+  return known;
+}
+
+}  // namespace
+
+const AvailableEstimate* AvailableEstimates::find(const std::string& name) const {
+  for (const AvailableEstimate& e : estimates)
+    if (e.name == name) return &e;
+  return nullptr;
+}
+
+AvailableEstimates availableIn(const Estimates& all) {
+  AvailableEstimates available;
+  available.features = all.features.has_value();
+  available.reference = !all.reference.empty();
+  for (const Estimate& e : all.estimates) {
+    const auto history = all.history.find(e.name);
+    std::vector<uint64_t> kept;
+    if (history != all.history.end())
+      for (const Checkpoint& c : history->second)
+        if (!c.mean.empty() && c.passes >= 2) kept.push_back(c.passes);
+    available.estimates.push_back({e.name, e.unbiased, e.correlation, e.passes,
+                                   !e.half[0].empty() && !e.half[1].empty(), !e.variance.empty(),
+                                   e.quarter.size() == 4 && (e.passes == 0 || e.passes >= 4),
+                                   history == all.history.end() ? 0 : static_cast<int>(history->second.size()),
+                                   std::move(kept), !e.bias.empty(), !e.direct.mean.empty()});
+  }
+  return available;
+}
+
+std::string defaultUnbiased(const AvailableEstimates& available) {
+  const auto first = [&](const auto& fits) {
+    for (const AvailableEstimate& e : available.estimates)
+      if (e.correlation == Correlation::Independent && fits(e)) return e.name;
+    return std::string();
+  };
+  const std::string unbiased = first([](const AvailableEstimate& e) { return e.unbiased; });
+  if (!unbiased.empty()) return unbiased;
+  return first([](const AvailableEstimate& e) { return e.halves && e.variance && !e.bias && !isMethod(e.name); });
+}
+
+const Step* CombinePlan::find(const std::string& name) const {
+  for (const Step& s : steps)
+    if (s.name == name) return &s;
+  return nullptr;
+}
+
+CombinePlan makeCombinePlan(const AvailableEstimates& available, const std::vector<std::string>& wanted,
+                            const CombinePlanOptions& options) {
+  const AvailableEstimates kept = withoutMethods(available);
+  CombinePlanner maker(kept, options);
+  for (const std::string& name : options.denoisers) maker.add(name);
+  for (const std::string& name : wanted) maker.add(name);
+  maker.dropReplaced(wanted);
+  return std::move(maker.combinePlan);
+}
+
+CombinePlanNeeds needsOf(const CombinePlan& combinePlan) {
+  CombinePlanNeeds all;
+  for (const Step& step : combinePlan.steps) {
+    if (!step.skipReason.empty()) continue;
+    const Needs needs = step.method->needs();
+    all.quarters |= needs.quarters || needs.quartersHelp;
+    all.features |= needs.features;
+    all.featureNoise |= needs.featureNoise;
+    all.directIndirect |= step.directIndirect;
+    all.checkpoints = std::max(all.checkpoints, needs.checkpoints);
+    if (step.stop > 0) all.stops.push_back(step.stop);
+  }
+  std::sort(all.stops.begin(), all.stops.end());
+  all.stops.erase(std::unique(all.stops.begin(), all.stops.end()), all.stops.end());
+  return all;
+}
+
+bool isMethod(const std::string& name) {
+  const auto methods = makeMethods();
+  return std::any_of(methods.begin(), methods.end(), [&](const auto& m) { return name == m->name(); });
+}
+
+std::shared_ptr<const Method> findMethod(const std::string& full) {
+  const size_t colon = full.find(':');
+  const std::string name = full.substr(0, colon);
+  for (auto& m : makeMethods()) {
+    if (name != m->name()) continue;
+    if (colon == std::string::npos) return std::shared_ptr<const Method>(std::move(m));
+    const auto* outside = dynamic_cast<const ExternalMethod*>(m.get());
+    const auto* stopping = dynamic_cast<const StoppingMethod*>(m.get());
+    auto made = outside    ? outside->with(full.substr(colon + 1))
+                : stopping ? withStop(*stopping, full, colon + 1)
+                           : nullptr;
+    if (!made) throw Error(ExitCode::Usage, fmt::format("{}: {} takes no parameter after a colon", full, name));
+    return std::shared_ptr<const Method>(std::move(made));
+  }
+  throw Error(ExitCode::Usage, fmt::format("unknown method '{}': known are {}", name, knownMethods()));
+}
+
+std::vector<OptionInfo> allMethodOptions() {
+  std::vector<OptionInfo> all;
+  for (const auto& m : makeMethods())
+    for (const OptionInfo& option : m->options())
+      if (std::none_of(all.begin(), all.end(), [&](const OptionInfo& o) { return o.name == option.name; }))
+        all.push_back(option);
+  return all;
+}
+
+std::string layerName(const std::string& name) {
+  const size_t colon = name.find(':');
+  std::string text = name.substr(0, colon);
+  if (colon != std::string::npos) {
+    std::string file = name.substr(colon + 1, name.find(':', colon + 1) - colon - 1), more;
+    if (text.ends_with("external-command")) {  // the program, and what tells commands of one program apart
+      ContentHash hash;
+      hash.add(name);
+      file = file.substr(file.find_first_not_of("' "));
+      file = file.substr(0, file.find_first_of("' "));
+      more = "-" + hexString(hash.value()).substr(0, 4);
+    }
+    text.append("-").append(std::filesystem::path(file).stem().string()).append(more);
+  }
+  std::replace(text.begin(), text.end(), '.', '-');
+  return text;
+}
+
+}  // namespace braid

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+// Decides, from what there is, which denoisers and combiners run on what and in which order: a pure function that a
+// plan prints before a render and that the pipeline executes after it. What cannot run says why in one sentence.
+//
+// A method is named by its name in the registry. Three forms add to it:
+//   name:parameter   a method that takes a parameter, such as external:FILE; the rest of the text is the parameter
+//   name@biased      the method with this biased input instead of the default one, such as js@ensemble; the input may
+//                    itself have an input: js@easy@nfor
+//   name:passes      a method that stops denoising, such as curves:128 (combiners/pipeline/denoise_cutoff.h)
+//
+// Names of methods go before names of estimates: an image that a file holds from an earlier run of a method is not used
+// under that method's name.
+//
+// How the roles are filled:
+//   unbiased    as named, or the first estimate that is unbiased and whose pixels are independent; or else the first
+//               with halves and variance and no estimate of its bias, such as vcm's: what it is off by is not seen.
+//   correlated  as named, or the first estimate that is unbiased and whose pixels are correlated.
+//   biased      after '@', or as named for all; or else the first denoiser asked for; or else the first biased
+//               estimate beside it, but not for methods that run the denoiser again (SURE); or else the first that runs
+//               of oidn, nfor, rdfc, pw, nlm; or else the first other denoiser that runs. Never box, which is input for
+//               stress tests. The named input itself gets the default one when it needs a biased input.
+//   bases       after '@' with '+' between them, as in ensemble@nfor+rdfc; or as named for all; or else the denoisers
+//               asked for and, when they are too few, all denoisers that run but box; and for methods that want them
+//               the other biased estimates.
+//
+// Where denoising stops: a method after its stop, if the image of then was kept, gets a step of its own for its
+// denoiser, called like nfor-stop128, which reads that image; the denoiser does not run on the newest image unless it
+// has to for others.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "combiners/method.h"
+
+namespace braid {
+
+// The choices of a user; empty: by the rules above.
+struct CombinePlanOptions {
+  std::string unbiased, correlated, biased;
+  std::vector<std::string> bases;
+  std::vector<std::string> denoisers;  // asked for, in this order
+  uint64_t stop = 0;                   // passes after which methods that can stop denoising do; 0: never
+};
+
+// What is known of an estimate without its pixels.
+struct AvailableEstimate {
+  std::string name;
+  bool unbiased = true;
+  Correlation correlation = Correlation::Independent;
+  uint64_t passes = 0;  // 0: not known
+  bool halves = true, variance = true, quarters = false;
+  int checkpoints = 0;
+  std::vector<uint64_t> kept{};  // passes of the checkpoints with their image, rising
+  bool bias = false;             // whether there is an estimate of it
+  bool directIndirect = false;   // whether direct light is known by itself
+};
+
+struct AvailableEstimates {
+  std::vector<AvailableEstimate> estimates;
+  bool features = false;
+  bool reference = false;
+  const AvailableEstimate* find(const std::string& name) const;
+};
+AvailableEstimates availableIn(const Estimates& estimates);
+
+// The estimate in the role of the unbiased one where no user names it; empty: there is none.
+std::string defaultUnbiased(const AvailableEstimates& available);
+
+// One method and its inputs, by name; empty: not used.
+struct Step {
+  std::string name;
+  std::shared_ptr<const Method> method;
+  std::string unbiased, biased, correlated;
+  std::vector<std::string> bases;
+  std::string skipReason;  // why it cannot run, in one sentence; empty: it can
+  uint64_t stop = 0;       // passes after which the biased input is not denoised anew; 0: never
+  // Passes of the earlier image that a denoiser reads in place of the newest, and whose denoised image a combiner
+  // reads; 0: none.
+  uint64_t kept = 0;
+  bool directIndirect = false;  // whether the method reads the direct light of the unbiased estimate
+  std::string note;             // what a user should know although it runs, in one sentence; mostly empty
+};
+
+struct CombinePlan {
+  std::vector<Step> steps;  // inputs before the methods that read them
+  const Step* find(const std::string& name) const;
+};
+
+// The steps for the wanted methods and everything that they need. Throws Error(Usage) naming an unknown method and
+// those that exist.
+CombinePlan makeCombinePlan(const AvailableEstimates& available, const std::vector<std::string>& wanted,
+                            const CombinePlanOptions& options);
+
+// What a render must keep for the steps that can run.
+struct CombinePlanNeeds {
+  bool quarters = false, features = false, featureNoise = false, directIndirect = false;
+  int checkpoints = 0;
+  std::vector<uint64_t> stops{};  // passes after which the image is kept, rising
+};
+CombinePlanNeeds needsOf(const CombinePlan& combinePlan);
+
+// Whether a method of exactly this name is registered.
+bool isMethod(const std::string& name);
+
+// The method that a name stands for, without its '@' part. Throws Error(Usage) naming those that exist.
+std::shared_ptr<const Method> findMethod(const std::string& name);
+
+// The options of every registered method, each once.
+std::vector<OptionInfo> allMethodOptions();
+
+// A name for layers of files: what follows a colon is shortened to the stem of a file name, a command to its
+// program and four digits of its hash, and no dots.
+std::string layerName(const std::string& name);
+
+}  // namespace braid

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// Removes fireflies of an unbiased estimate: pixels where one sample, and nothing else, speaks for what they show.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "combiners/method.h"
+
+namespace braid {
+
+// A pixel that is replaced, and by what.
+struct Firefly {
+  size_t index = 0;
+  Spectrum value{0}, variance{0};
+};
+
+// The fireflies of an unbiased image (ALGORITHMS-BEYOND 8.3, step 6, looks for them in what has been combined; by then
+// filters have spread them over their neighbours). A pixel is one if
+//   - its standard deviation, sqrt(mean_RGB v), is above 8 times the mean of these over 15x15 pixels;
+//   - it is brighter than all of its 5x5 neighbours that are no candidates and lie on the same surface, and than the
+//     mean that would replace it;
+//   - its two darkest quarters, or without quarters its darker half, show less than 0.3 of the excess over the
+//     neighbours' mean: a firefly lives in one or two quarters, a thin lamp in all four.
+// Value and variance are replaced by the means of those neighbours, weighted by nearness and by likeness in albedo and
+// normal. The third condition makes fireflies vanish as samples grow: what is there shows in every quarter. With
+// neither quarters nor halves there are no fireflies. The estimate has a variance; the features may be null.
+std::vector<Firefly> findFireflies(const Estimate& estimate, const GivenQuarters& quarters, const Features* features);
+
+// What denoisers read of the estimate, its mean, halves and variance, with the fireflies replaced.
+Estimate withoutFireflies(const Estimate& estimate, const GivenQuarters& quarters, const Features* features);
+
+// Writes the replacements into an image or into a variance.
+void replaceValues(Rgb<float>& image, const std::vector<Firefly>& fireflies);
+void replaceVariances(Rgb<float>& variance, const std::vector<Firefly>& fireflies);
+
+}  // namespace braid

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// glTF metallic-roughness material with its extensions, as plain data. Factors are linear; textures multiply factors.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "renderer/core/vec.h"
+#include "renderer/scene/data/texture.h"
+
+namespace braid {
+
+enum class AlphaMode : uint8_t { Opaque, Mask, Blend };
+
+// GGX alpha below which a surface is taken for smooth: a mirror, or a clear pane.
+inline constexpr float kSmoothAlpha = 1e-3f;
+
+struct Material {
+  std::string name;
+
+  Spectrum baseColor{1};
+  float alpha = 1;
+  TextureRef baseColorTexture;  // RGB colour (sRGB), A coverage
+  float metallic = 1;
+  float roughness = 1;                  // perceptual: GGX alpha = roughness²
+  TextureRef metallicRoughnessTexture;  // G roughness, B metallic
+
+  // KHR_materials_pbrSpecularGlossiness: baseColor holds the diffuse factor, roughness = 1 - glossiness.
+  bool specularGlossiness = false;
+  Spectrum specularF0{1};
+  TextureRef specularGlossinessTexture;  // RGB specular F0 (sRGB), A glossiness
+
+  TextureRef normalTexture;
+  float normalScale = 1;
+
+  Spectrum emission{0};  // emissiveFactor · emissiveStrength, W·sr⁻¹·m⁻²
+  TextureRef emissiveTexture;
+
+  AlphaMode alphaMode = AlphaMode::Opaque;
+  float alphaCutoff = 0.5f;
+  bool doubleSided = false;
+  bool unlit = false;
+
+  float ior = 1.5f;  // 0 is legal: F = 1 (KHR_materials_ior)
+  float dispersion = 0;
+
+  float specular = 1;          // KHR_materials_specular
+  TextureRef specularTexture;  // A
+  Spectrum specularColor{1};
+  TextureRef specularColorTexture;  // RGB (sRGB)
+
+  float transmission = 0;
+  TextureRef transmissionTexture;  // R
+  bool thinWalled = true;          // thicknessFactor == 0: an infinitely thin sheet, no volume
+  Spectrum attenuationColor{1};
+  float attenuationDistance = kInfinity;  // metres
+
+  float diffuseTransmission = 0;
+  TextureRef diffuseTransmissionTexture;  // A
+  Spectrum diffuseTransmissionColor{1};
+  TextureRef diffuseTransmissionColorTexture;  // RGB (sRGB)
+
+  float clearcoat = 0;
+  TextureRef clearcoatTexture;  // R
+  float clearcoatRoughness = 0;
+  TextureRef clearcoatRoughnessTexture;  // G
+  TextureRef clearcoatNormalTexture;
+  float clearcoatNormalScale = 1;
+  uint8_t coatFrame = 0;  // which tangents of the mesh belong to the texture: 0 `tangents`, else `otherTangents`
+
+  Spectrum sheenColor{0};
+  TextureRef sheenColorTexture;  // RGB (sRGB)
+  float sheenRoughness = 0;
+  TextureRef sheenRoughnessTexture;  // A
+
+  float anisotropy = 0;
+  float anisotropyRotation = 0;  // radians, counter-clockwise from the tangent
+  TextureRef anisotropyTexture;  // RG direction, B strength
+  uint8_t anisotropyFrame = 0;   // as coatFrame
+
+  float iridescence = 0;
+  TextureRef iridescenceTexture;  // R
+  float iridescenceIor = 1.3f;
+  float iridescenceThicknessMin = 100;  // nanometres
+  float iridescenceThicknessMax = 400;
+  TextureRef iridescenceThicknessTexture;  // G
+
+  bool emissive() const { return maxComponent(emission) > 0; }
+  bool transmissive() const { return transmission > 0; }
+  bool hasVolume() const { return !thinWalled && (transmissive() || diffuseTransmission > 0); }
+  // Whether light may go straight on through it somewhere: transmissive, thin, smooth.
+  bool mayBePane() const {
+    return transmissive() && thinWalled && !unlit && !specularGlossiness &&
+           (metallicRoughnessTexture || (metallic < 1 && roughness * roughness < kSmoothAlpha));
+  }
+  // Tangents are needed by normal maps and by anisotropy.
+  bool needsTangents() const { return normalTexture || clearcoatNormalTexture || anisotropy != 0; }
+};
+
+}  // namespace braid

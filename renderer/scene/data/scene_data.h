@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a loader hands to Scene: plain, validated data in metres. Tests and benchmarks build it by hand.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "renderer/core/vec.h"
+#include "renderer/scene/data/material.h"
+#include "renderer/scene/data/texture.h"
+
+namespace braid {
+
+// Sets of texture coordinates that one mesh can have.
+inline constexpr uint32_t kUvSlots = 4;
+
+// One glTF primitive as an indexed triangle list. Embree reads positions and triangles in place, so both are allocated
+// with room for one more element (Embree loads 16 bytes a vertex): call padForEmbree() after filling them.
+struct TriangleMesh {
+  std::string name;
+  std::vector<Vec3> positions;
+  std::vector<glm::uvec3> triangles;
+  std::vector<Vec3> normals;   // empty: flat shading by the geometric normal
+  std::vector<Vec4> tangents;  // empty unless the material needs them; w = ±1 is the sign of the bitangent
+  // Frames 1 and 2 of materials whose textures lie differently (Material::coatFrame); empty: the frame is `tangents`.
+  std::vector<Vec4> otherTangents[2];
+  std::vector<Vec2> uv[kUvSlots];  // empty unless a texture reads them
+  std::vector<Vec4> colors;        // empty, or linear RGBA in [0,1] multiplying the base colour
+  uint32_t material = 0;           // index into SceneData::materials, always valid
+
+  void padForEmbree() {
+    positions.reserve(positions.size() + 1);
+    triangles.reserve(triangles.size() + 1);
+  }
+};
+
+// A mesh placed in the world. Several instances may share a mesh; a negative determinant flips the front side.
+struct MeshInstance {
+  uint32_t mesh = 0;
+  Mat4 toWorld{1};
+};
+
+enum class PunctualKind { Point, Spot, Directional };
+
+// KHR_lights_punctual, numbers taken one to one: point/spot W·sr⁻¹, directional W·m⁻².
+struct PunctualLight {
+  std::string name;
+  PunctualKind kind = PunctualKind::Point;
+  Spectrum intensity{1};  // colour · intensity
+  Vec3 position{0};
+  Vec3 direction{0, 0, -1};  // the way the light travels, unit
+  float range = kInfinity;   // metres, see rangeWindow()
+  float innerConeAngle = 0;  // radians
+  float outerConeAngle = kPi / 4;
+};
+
+struct CameraData {
+  std::string name;
+  Mat4 toWorld{1};  // rigid: rotation and translation only; looks along -Z, +Y up
+  bool orthographic = false;
+  float yfov = 0.8f;            // radians, full vertical angle (perspective)
+  std::optional<float> aspect;  // width / height; none: that of the output
+  float xmag = 1, ymag = 1;     // half extents (orthographic), metres
+};
+
+// A latitude-longitude environment: up is +Y, the centre of the image lies in direction +X and what is right of it
+// toward +Z, as in three.js and, with glTF's axes, in Blender; `rotation` turns it about +Y, from +Z toward +X.
+struct EnvironmentData {
+  std::shared_ptr<const Image> image;  // null: the constant `radiance`
+  Spectrum radiance{0};                // constant radiance, or the scale of the image
+  float rotation = 0;                  // radians about +Y
+};
+
+// A clip of the file, for lists.
+struct AnimationClip {
+  std::string name;
+  double seconds = 0;  // the last key time
+};
+
+struct SceneData {
+  std::string file;
+  // Where the zero of all positions here lies in the coordinates of the file: a scene far from the file's own zero is
+  // brought to it before its numbers become floats (recentre.h).
+  glm::dvec3 origin{0};
+  std::vector<TriangleMesh> meshes;
+  std::vector<MeshInstance> instances;
+  std::vector<Material> materials;
+  std::vector<Texture> textures;
+  std::vector<PunctualLight> lights;
+  std::vector<CameraData> cameras;
+  std::optional<EnvironmentData> environment;
+
+  // For `braid info`.
+  std::vector<std::string> extensionsUsed, extensionsRequired, extensionsIgnored;
+  std::vector<std::string> variants;
+  std::vector<std::string> sceneNames;
+  std::vector<AnimationClip> animations;
+  std::vector<std::string> warnings;  // one line each, already counted
+  std::vector<std::string> notes;     // flaws of what the picture does not use
+  uint64_t contentHash = 0;           // over every referenced byte
+  bool defaultCamera = false;         // the file had none: framed from the bounds
+  bool defaultLight = false;          // the file had none: a grey dome
+};
+
+}  // namespace braid

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/scene/gltf/document/gltf_extensions.h"
+
+#include <algorithm>
+#include <array>
+
+#include <nlohmann/json.hpp>
+
+namespace braid::gltf {
+
+namespace {
+
+constexpr std::array kRendered = {
+    "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
+    "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_node_visibility",
+    "KHR_texture_transform",
+};
+
+// No pixel depends on them: metadata, feature ids, outlines, levels of detail beside the finest, interaction, sound,
+// physics. KHR_animation_pointer moves what is not rendered at rest.
+constexpr std::array kHarmless = {
+    "3DTILES_metadata",
+    "AGI_articulations",
+    "AGI_stk_metadata",
+    "CESIUM_primitive_outline",
+    "EXT_feature_metadata",
+    "EXT_instance_features",
+    "EXT_mesh_features",
+    "EXT_property_attributes",
+    "EXT_property_table",
+    "EXT_property_texture",
+    "EXT_structural_metadata",
+    "FB_ngon_encoding",
+    "GODOT_single_root",
+    "KHR_animation_pointer",
+    "KHR_audio",
+    "KHR_audio_emitter",
+    "KHR_collision_shapes",
+    "KHR_implicit_shapes",
+    "KHR_interactivity",
+    "KHR_node_hoverability",
+    "KHR_node_selectability",
+    "KHR_physics_rigid_bodies",
+    "KHR_rigid_bodies",
+    "KHR_xmp",
+    "KHR_xmp_json_ld",
+    "MSFT_audio_emitter",
+    "MSFT_collision_mesh",
+    "MSFT_lod",
+    "MSFT_physics",
+    "OMI_audio_emitter",
+    "OMI_collider",
+    "OMI_link",
+    "OMI_personality",
+    "OMI_physics_body",
+    "OMI_physics_gravity",
+    "OMI_physics_joint",
+    "OMI_physics_shape",
+    "OMI_seat",
+    "OMI_spawn_point",
+    "OMI_vehicle_body",
+    "OMI_vehicle_hover_thruster",
+    "OMI_vehicle_thruster",
+    "OMI_vehicle_wheel",
+};
+
+template <class List>
+bool isIn(const List& list, const std::string& name) {
+  return std::find(list.begin(), list.end(), name) != list.end();
+}
+
+std::vector<std::string> names(const nlohmann::json& root, const char* list) {
+  const auto found = root.find(list);
+  return found == root.end() ? std::vector<std::string>() : found->get<std::vector<std::string>>();
+}
+
+}  // namespace
+
+void checkExtensions(Document& document, const nlohmann::json& root) {
+  std::vector<Problem> unsupported;
+  const std::vector<std::string> required = names(root, "extensionsRequired");
+  for (size_t i = 0; i < required.size(); ++i) {
+    const std::string& name = required[i];
+    const std::string place = "/extensionsRequired/" + std::to_string(i);
+    // Spreading colours and moving what is no node are not rendered: never silently.
+    if (name == "KHR_materials_dispersion" || (name == "KHR_animation_pointer" && document.options.frameTime))
+      document.report.warn(place,
+                           "extension " + quoted(name) + " is read but not rendered; the picture lacks its effect");
+    if (isIn(kRendered, name) || isIn(kHarmless, name) || name.empty()) continue;
+    if (isIn(document.options.ignoredExtensions, name)) {
+      document.report.warn(place, "extension " + quoted(name) + " is required but ignored, as --ignore-extension says");
+      continue;
+    }
+    const std::string mend =
+        name == "KHR_texture_basisu" ? "export the textures as PNG, JPEG or WebP" : "export the file without it";
+    unsupported.push_back(
+        {place, "extension " + quoted(name) + " is not supported; " + mend + ", or give --ignore-extension " + name});
+  }
+  if (!unsupported.empty()) throw SceneError(ExitCode::UnsupportedExtension, document.path, std::move(unsupported));
+  std::string ignored;
+  for (const std::string& name : names(root, "extensionsUsed")) {
+    if (isIn(kRendered, name) || isIn(kHarmless, name) || name.empty()) continue;
+    document.extensionsIgnored.push_back(name);
+    ignored += (ignored.empty() ? "" : ", ") + quoted(name);
+  }
+  if (!ignored.empty())
+    document.report.warn("/extensionsUsed", "extensions that are not supported are ignored: " + ignored);
+}
+
+}  // namespace braid::gltf

@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+// The functions of tinygltf, compiled here: Debian's libdraco exports those of another version under the same names, so
+// that with the shared library it would depend on the order of linking which are called.
+#include <fstream>
+
+#include "renderer/scene/gltf/document/gltf_document.h"
+
+#define TINYGLTF_IMPLEMENTATION
+#include <tiny_gltf.h>
+#undef TINYGLTF_IMPLEMENTATION  // other files may follow in a unity build

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// One primitive of a glTF mesh to a TriangleMesh: decompression, triangulation, morphing, skinning, repairs, tangents.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "renderer/scene/gltf/document/gltf_document.h"
+#include "renderer/scene/gltf/gltf_material.h"
+
+namespace braid::gltf {
+
+struct MeshJob {
+  const Primitive* primitive = nullptr;
+  std::string place;  // JSON pointer of the primitive
+  std::string name;
+  uint32_t material = 0;  // index into SceneData::materials
+  MaterialTable::Uvs uvs;
+  bool needsTangents = false;
+  bool keepAllAttributes = false;
+  std::vector<float> weights;  // of the morph targets
+  // Joint to world times inverse bind, zero for joints that do not exist; null: not skinned.
+  std::shared_ptr<const std::vector<glm::dmat4>> joints;
+  glm::dvec3 origin{0};  // taken from skinned positions
+};
+
+// What a compressed mesh holds, with attributes by name.
+struct DracoMesh {
+  struct Attribute {
+    uint32_t components = 0;
+    std::vector<float> values;
+  };
+  uint64_t vertices = 0;
+  std::map<std::string, Attribute> attributes;
+  std::vector<uint32_t> indices;
+};
+
+// gltf_draco.cpp: nothing, with a problem reported, if the data is broken.
+std::optional<DracoMesh> decodeDraco(const Document& document, const MeshJob& job, Report& report);
+
+// Thread-safe for distinct reports. An empty mesh if there is nothing to draw.
+TriangleMesh buildMesh(const Document& document, const MeshJob& job, Report& report);
+
+// Whether Draco holds its attributes.
+bool isPacked(const Primitive& primitive);
+
+// Memory a built primitive takes at most, from the counts of its accessors.
+uint64_t estimatedBytes(const Document& document, const Primitive& primitive);
+
+}  // namespace braid::gltf

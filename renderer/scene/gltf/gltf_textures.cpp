@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+// Kept materials: uv slots, texture indices, and decoding of the images they read.
+#include <algorithm>
+#include <atomic>
+#include <set>
+
+#include "renderer/core/parallel.h"
+#include "renderer/scene/gltf/gltf_material.h"
+
+namespace braid::gltf {
+
+namespace {
+
+using TangentSource = MaterialTable::TangentSource;
+
+TangentSource tangentSource(const TextureRef& ref) {
+  TangentSource source{ref.uvSet, {ref.matrix[0], ref.matrix[1], ref.matrix[3], ref.matrix[4]}};
+  // Stretching turns no tangent.
+  const std::array<float, 4>& l = source.linear;
+  if (l[0] > 0 && l[1] == 0 && l[2] == 0 && l[3] > 0) source.linear = {1, 0, 0, 1};
+  return source;
+}
+
+// One frame for each way in which the textures that read tangents lie, that of the normal map first. Anisotropy without
+// a texture follows the coordinates as they are.
+std::vector<TangentSource> tangentSources(Material& m) {
+  std::vector<TangentSource> sources;
+  const auto frameOf = [&](const TangentSource& source) {
+    const auto found = std::find(sources.begin(), sources.end(), source);
+    const auto frame = static_cast<uint8_t>(found - sources.begin());
+    if (found == sources.end()) sources.push_back(source);
+    return frame;
+  };
+  uint32_t set = 0;
+  for (const TextureRef* ref : {&m.anisotropyTexture, &m.clearcoatNormalTexture, &m.normalTexture}) {
+    if (*ref) set = ref->uvSet;
+  }
+  if (m.normalTexture) frameOf(tangentSource(m.normalTexture));
+  if (m.clearcoatNormalTexture) m.coatFrame = frameOf(tangentSource(m.clearcoatNormalTexture));
+  if (m.anisotropyTexture) {
+    m.anisotropyFrame = frameOf(tangentSource(m.anisotropyTexture));
+  } else if (m.anisotropy != 0 || sources.empty()) {
+    m.anisotropyFrame = frameOf({set, {1, 0, 0, 1}});
+  }
+  return sources;
+}
+
+Wrap wrapOf(int mode) {
+  if (mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE) return Wrap::Clamp;
+  return mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::Mirror : Wrap::Repeat;
+}
+
+// Factors of exactly zero switch whole lobes off; their textures need not be read.
+void dropUnreadTextures(Material& m) {
+  if (isBlack(m.emission)) m.emissiveTexture = {};
+  if (m.transmission == 0) m.transmissionTexture = {};
+  if (m.diffuseTransmission == 0) m.diffuseTransmissionTexture = m.diffuseTransmissionColorTexture = {};
+  if (m.clearcoat == 0) m.clearcoatTexture = m.clearcoatRoughnessTexture = m.clearcoatNormalTexture = {};
+  if (isBlack(m.sheenColor)) m.sheenColorTexture = m.sheenRoughnessTexture = {};
+  if (m.anisotropy == 0) m.anisotropyTexture = {};
+  if (m.iridescence == 0) m.iridescenceTexture = m.iridescenceThicknessTexture = {};
+  if (m.specular == 0) m.specularTexture = m.specularColorTexture = {};
+}
+
+struct DecodedImage {
+  std::vector<uint8_t> file;  // of an external image
+  Bytes encoded;
+  std::shared_ptr<const Image> image;
+  std::string problem, note;
+};
+
+// Small files can hold huge empty pictures: bounds what all of them together may take.
+class PixelBudget {
+ public:
+  explicit PixelBudget(uint64_t sourceBytes) : limit_(kAlways + kTimesSource * sourceBytes) {}
+  bool spent() const { return used_ > limit_; }
+  void add(uint64_t bytes) { used_ += bytes; }
+
+ private:
+  static constexpr uint64_t kAlways = uint64_t(8) << 30, kTimesSource = 256;
+  uint64_t limit_;
+  std::atomic<uint64_t> used_{0};
+};
+
+void decode(const Document& document, const ImageSource& source, PixelBudget& budget, DecodedImage& out) {
+  if (budget.spent()) {
+    out.problem = "is one image too many: together they take too much memory; make them smaller";
+    return;
+  }
+  if (source.view >= 0) {
+    out.encoded = document.views[static_cast<size_t>(source.view)].data;
+    if (out.encoded.empty()) return;  // reported with the view
+  } else {
+    if (source.uri.empty()) return;  // reported with the image
+    std::optional<std::vector<uint8_t>> data = document.files.read(source.uri, out.problem, out.note);
+    if (!data) return;
+    out.file = std::move(*data);
+    out.encoded = out.file;
+  }
+  const bool named = source.view < 0 && !isDataUri(source.uri);
+  try {
+    out.image = decodeImage(out.encoded.data(), out.encoded.size(), named ? source.uri : source.name);
+    budget.add(out.image->bytes.size() + out.image->floats.size() * sizeof(float));
+  } catch (const Error& error) {
+    out.problem = error.what();
+  }
+}
+
+}  // namespace
+
+MaterialTable::Uvs MaterialTable::assignUvSlots(Material& material, int fileMaterial) {
+  std::set<uint32_t> sets;
+  forEachTexture(material, [&](const TextureRef& ref, bool) {
+    if (ref) sets.insert(ref.uvSet);
+  });
+  Uvs uvs;
+  uvs.tangents = tangentSources(material);
+  if (sets.size() > kUvSlots) {
+    document_.report.warn(
+        "/materials/" + std::to_string(fileMaterial),
+        "a material reads more than " + std::to_string(kUvSlots) + " uv sets; the others read the first");
+  }
+  if (sets.empty() || *sets.rbegin() < kUvSlots) {
+    for (const uint32_t set : sets) uvs.set[set] = set;
+    return uvs;
+  }
+  size_t slot = 0;
+  for (const uint32_t set : sets) {
+    if (slot < kUvSlots) uvs.set[slot++] = set;
+  }
+  forEachTexture(material, [&](TextureRef& ref, bool) {
+    const auto found = std::find(uvs.set.begin(), uvs.set.end(), ref.uvSet);
+    ref.uvSet = static_cast<uint8_t>(found == uvs.set.end() ? 0 : found - uvs.set.begin());
+  });
+  return uvs;
+}
+
+uint32_t MaterialTable::use(int fileMaterial) {
+  uint32_t& placed = placed_[fileMaterial < 0 ? placed_.size() - 1 : static_cast<size_t>(fileMaterial)];
+  if (placed != kNone) return placed;
+  placed = static_cast<uint32_t>(scene_.materials.size());
+  Material material;
+  if (fileMaterial < 0) {
+    material.name = "default";
+  } else {
+    material = document_.materials[static_cast<size_t>(fileMaterial)];
+    document_.usage.mark("materials", fileMaterial);
+  }
+  material.doubleSided |= doubleSided_;
+  dropUnreadTextures(material);
+  forEachTexture(material, [&](TextureRef& ref, bool) {
+    if (!ref) return;
+    const tinygltf::Texture& texture = document_.model.textures[static_cast<size_t>(ref.texture)];
+    document_.usage.mark("textures", ref.texture);
+    document_.usage.mark("samplers", texture.sampler);
+    // One in an unsupported format was warned about: the factor alone stays.
+    if (imageOf(texture) < 0) ref = {};
+  });
+  uvs_.push_back(assignUvSlots(material, fileMaterial));
+  forEachTexture(material, [&](TextureRef& ref, bool isColour) {
+    if (!ref) return;
+    const auto next = static_cast<int32_t>(textures_.size());
+    ref.texture = textures_.emplace(std::make_pair(ref.texture, isColour), next).first->second;
+  });
+  scene_.materials.push_back(std::move(material));
+  return placed;
+}
+
+std::vector<int> MaterialTable::usedImages() const {
+  std::set<int> used;
+  for (const auto& [key, number] : textures_) {
+    const tinygltf::Texture& texture = document_.model.textures[static_cast<size_t>(key.first)];
+    used.insert(imageOf(texture));
+  }
+  return {used.begin(), used.end()};
+}
+
+void MaterialTable::loadTextures() {
+  std::vector<DecodedImage> decoded(document_.images.size());
+  // Two entries for one file or view share its pixels.
+  std::map<std::pair<std::string_view, int>, int> firstOf;
+  std::vector<int> unique;
+  for (const int image : usedImages()) {
+    const ImageSource& source = document_.images[static_cast<size_t>(image)];
+    document_.usage.mark("images", image);
+    document_.useView(source.view);
+    if (firstOf.emplace(std::pair<std::string_view, int>(source.uri, source.view), image).second)
+      unique.push_back(image);
+  }
+  PixelBudget budget(document_.sourceBytes);
+  parallelFor(unique.size(), [&](size_t i) {
+    const auto image = static_cast<size_t>(unique[i]);
+    decode(document_, document_.images[image], budget, decoded[image]);
+  });
+  for (const int image : unique) {
+    DecodedImage& item = decoded[static_cast<size_t>(image)];
+    const std::string place = "/images/" + std::to_string(image);
+    if (!item.problem.empty()) document_.report.problem(place, item.problem, "factors alone are used");
+    if (!item.note.empty()) document_.report.problem(place, item.note, "that file is read");
+    if (item.image && item.image->limited > 0)
+      document_.report.warn(place, std::to_string(item.image->limited) +
+                                       " values are not finite, negative or above 1e18; they are limited");
+    if (item.image && document_.images[static_cast<size_t>(image)].view < 0)
+      document_.hash.add(item.encoded.data(), item.encoded.size());
+    item.file = {};
+  }
+  scene_.textures.resize(textures_.size());
+  for (const auto& [key, number] : textures_) {
+    const tinygltf::Texture& texture = document_.model.textures[static_cast<size_t>(key.first)];
+    const ImageSource& image = document_.images[static_cast<size_t>(imageOf(texture))];
+    const std::shared_ptr<const Image>& pixels =
+        decoded[static_cast<size_t>(firstOf.at({image.uri, image.view}))].image;
+    if (!pixels) continue;
+    const tinygltf::Sampler sampler =
+        texture.sampler < 0 ? tinygltf::Sampler() : document_.model.samplers[static_cast<size_t>(texture.sampler)];
+    scene_.textures[static_cast<size_t>(number)] =
+        Texture(pixels, key.second, wrapOf(sampler.wrapS), wrapOf(sampler.wrapT),
+                sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST ? Filter::Nearest : Filter::Linear);
+  }
+  dropMissingTextures();
+}
+
+// A texture that cannot be had leaves its factor alone.
+void MaterialTable::dropMissingTextures() {
+  std::vector<int32_t> placed(scene_.textures.size(), -1);
+  int32_t kept = 0;
+  for (size_t i = 0; i < placed.size(); ++i) {
+    if (scene_.textures[i].sharedImage()) placed[i] = kept++;
+  }
+  std::erase_if(scene_.textures, [](const Texture& texture) { return !texture.sharedImage(); });
+  for (Material& material : scene_.materials) {
+    forEachTexture(material, [&](TextureRef& ref, bool) {
+      if (ref) ref.texture = placed[static_cast<size_t>(ref.texture)];
+    });
+  }
+}
+
+}  // namespace braid::gltf

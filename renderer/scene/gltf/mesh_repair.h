@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// Makes a mesh safe to render: no NaN, unit normals and tangents, no unused vertices.
+#pragma once
+
+#include <string>
+
+#include "renderer/scene/gltf/document/gltf_report.h"
+#include "renderer/scene/data/scene_data.h"
+
+namespace braid::gltf {
+
+// Attributes that are needed only while a mesh is built.
+struct ExtraAttributes {
+  std::vector<std::vector<Vec2>> uv;  // of each tangent frame
+};
+
+inline Vec3 normalizedOr(const Vec3& v, const Vec3& fallback) {
+  // In double: the square of a small or large float is out of range.
+  const glm::dvec3 d(v);
+  const double length = glm::length(d);
+  return length > 1e-6 && length < 1e18 ? Vec3(d / length) : fallback;
+}
+
+// Drops triangles with a vertex that is not finite, or beyond what the ray tracer can hold. Returns whether any are
+// left.
+bool dropBadTriangles(TriangleMesh& mesh, Report& report, const std::string& place);
+
+// Removes vertices that no triangle uses.
+void compactVertices(TriangleMesh& mesh, ExtraAttributes& extras);
+
+// Normalises normals; replaces those that are zero or not finite by the average of the adjacent triangles.
+void repairNormals(TriangleMesh& mesh, Report& report, const std::string& place);
+
+// Normalises tangents; returns false, with a warning, if some are unusable.
+bool repairTangents(TriangleMesh& mesh, Report& report, const std::string& place);
+
+// Gives each triangle its own vertices with the geometric normal.
+void splitIntoFlatTriangles(TriangleMesh& mesh, ExtraAttributes& extras);
+
+// Calls visit(vector) for every per-vertex array that is not empty.
+template <class Visit>
+void forEachAttribute(TriangleMesh& mesh, ExtraAttributes& extras, const Visit& visit) {
+  const auto present = [&](auto& array) {
+    if (!array.empty()) visit(array);
+  };
+  present(mesh.positions);
+  present(mesh.normals);
+  present(mesh.tangents);
+  for (auto& uv : mesh.uv) present(uv);
+  present(mesh.colors);
+  for (std::vector<Vec2>& uv : extras.uv) present(uv);
+}
+
+}  // namespace braid::gltf

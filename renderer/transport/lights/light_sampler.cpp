@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/transport/lights/light_sampler.h"
+
+#include <algorithm>
+
+#include "renderer/transport/bsdf/warp.h"
+
+namespace braid {
+
+namespace {
+
+LightBounds boundsOf(const EmissiveTriangle& e) {
+  LightBounds b;
+  b.bounds.extend(e.p0);
+  b.bounds.extend(e.p0 + e.e1);
+  b.bounds.extend(e.p0 + e.e2);
+  b.axis = e.normal;
+  b.cosNormals = 1;
+  b.cosEmission = 0;
+  b.power = e.power();
+  b.twoSided = e.twoSided;
+  return b;
+}
+
+float punctualPower(const PunctualLight& light) {
+  const float intensity = average(light.intensity);
+  return light.kind == PunctualKind::Point ? 4 * kPi * intensity
+                                           : 2 * kPi * (1 - std::cos(light.outerConeAngle)) * intensity;
+}
+
+LightBounds boundsOf(const PunctualLight& light) {
+  LightBounds b;
+  b.bounds.extend(light.position);
+  b.range = light.range;
+  b.axis = light.direction;
+  // A point light has normals everywhere; a spot only within its cone. Power as if the cone were a full sphere:
+  // importance is per direction.
+  b.power = 4 * kPi * average(light.intensity);
+  b.cosNormals = light.kind == PunctualKind::Point ? -1.0f : std::cos(light.outerConeAngle);
+  b.cosEmission = light.kind == PunctualKind::Point ? 0.0f : std::cos(0.01f);
+  return b;
+}
+
+std::vector<float> cumulativeOf(std::vector<double> weight) {
+  std::vector<float> cumulative(weight.size() + 1, 0.0f);
+  double total = 0;
+  for (double w : weight) total += w;
+  // TRAP: a share below the resolution of a float would be 0 and a dim point light beside a very bright one never
+  // chosen.
+  for (double& w : weight)
+    if (w > 0) w = std::max(w, total * 0x1p-20);
+  total = 0;
+  for (double w : weight) total += w;
+  double sum = 0;
+  for (size_t i = 0; i < weight.size(); ++i) {
+    sum += weight[i];
+    cumulative[i + 1] = static_cast<float>(total > 0 ? sum / total : 0);
+  }
+  if (total > 0) cumulative.back() = 1;
+  return cumulative;
+}
+
+// Picks an interval of a cumulative table; u becomes a fresh variate.
+size_t pick(const std::vector<float>& cumulative, float& u, float& probability) {
+  const size_t count = cumulative.size() - 1;
+  size_t i = 0;
+  if (count <= 8) {
+    for (size_t k = 1; k < count; ++k) i += u >= cumulative[k] ? 1u : 0u;
+  } else {
+    i = static_cast<size_t>(std::upper_bound(cumulative.begin() + 1, cumulative.end() - 1, u) - cumulative.begin() - 1);
+  }
+  probability = cumulative[i + 1] - cumulative[i];
+  u = probability > 0 ? std::clamp((u - cumulative[i]) / probability, 0.0f, kOneMinusEpsilon) : u;
+  return i;
+}
+
+}  // namespace
+
+float spotFalloff(const PunctualLight& light, float cosAngle) {
+  const float outer = std::cos(light.outerConeAngle), inner = std::cos(light.innerConeAngle);
+  const float scale = 1 / std::max(0.001f, inner - outer);
+  return sqr(std::clamp((cosAngle - outer) * scale, 0.0f, 1.0f));
+}
+
+bool hierarchyPays(size_t emissiveTriangles, size_t positionalLights) {
+  const size_t finite = emissiveTriangles + positionalLights;
+  return finite > 8 || (finite > 1 && positionalLights > 0);
+}
+
+LightSampler::LightSampler(const Scene& scene, LightStrategy strategy) : scene_(scene) {
+  const std::vector<EmissiveTriangle>& emitters = scene.emitters();
+  for (uint32_t i = 0; i < scene.lights().size(); ++i)
+    (scene.lights()[i].kind == PunctualKind::Directional ? directional_ : positional_).push_back(i);
+  finite_ = emitters.size() + positional_.size();
+  hierarchy_ = strategy == LightStrategy::Hierarchy ||
+               (strategy == LightStrategy::Automatic && hierarchyPays(emitters.size(), positional_.size()));
+
+  double finitePower = 0;
+  std::vector<double> powers;
+  for (const EmissiveTriangle& e : emitters) powers.push_back(static_cast<double>(e.power()));
+  for (uint32_t i : positional_) powers.push_back(static_cast<double>(punctualPower(scene.lights()[i])));
+  for (double p : powers) finitePower += p;
+  if (hierarchy_) {
+    std::vector<LightBounds> bounds;
+    bounds.reserve(finite_);
+    for (const EmissiveTriangle& e : emitters) bounds.push_back(boundsOf(e));
+    for (uint32_t i : positional_) bounds.push_back(boundsOf(scene.lights()[i]));
+    tree_.build(bounds);
+  } else if (finite_ > 0) {
+    cumulative_ = cumulativeOf(powers);
+  }
+  std::vector<double> irradiances;
+  double directionalIrradiance = 0;
+  for (uint32_t i : directional_) {
+    irradiances.push_back(static_cast<double>(average(scene.lights()[i].intensity)));
+    directionalIrradiance += irradiances.back();
+  }
+  directionalCumulative_ = cumulativeOf(irradiances);
+
+  // Categories: half by the irradiance they would give unoccluded, half evenly, so that no category starves where the
+  // others are hidden.
+  const double radius = static_cast<double>(scene.traits().radius);
+  const double environmentIrradiance =
+      scene.environment() ? static_cast<double>(kPi * average(scene.environment()->average())) : 0.0;
+  const double share[3] = {finitePower / (4 * static_cast<double>(kPi) * radius * radius), directionalIrradiance,
+                           environmentIrradiance};
+  const double total = share[0] + share[1] + share[2];
+  const int active = (share[0] > 0) + (share[1] > 0) + (share[2] > 0);
+  if (active == 0 || !(total > 0) || !std::isfinite(total)) return;
+  float* probability[3] = {&probabilityFinite_, &probabilityDirectional_, &probabilityEnvironment_};
+  for (int i = 0; i < 3; ++i) {
+    if (!(share[i] > 0)) continue;
+    *probability[i] = active == 1 ? 1.0f : static_cast<float>(0.5 * share[i] / total + 0.5 / active);
+  }
+}
+
+bool LightSampler::sampleEmitter(const EmissiveTriangle& e, const Vec3& p, const Vec3& n, bool twoSided, Vec2 u,
+                                 LightSample& out) const {
+  const Vec2 b = squareToTriangle(u);
+  const float b1 = b.x, b2 = b.y;
+  const Vec3 point = e.p0 + b1 * e.e1 + b2 * e.e2;
+  const Vec3 d = point - p;
+  const float distance2 = glm::dot(d, d);
+  if (!(distance2 > 0)) return false;
+  float cosLight = -glm::dot(d, e.normal);
+  if (e.twoSided) cosLight = std::abs(cosLight);
+  if (!(cosLight > 0)) return false;
+  // The receiver's side first: half of all samples end here, before the square root.
+  if (!twoSided && !(glm::dot(d, n) > 0)) return false;
+  out.distance = std::sqrt(distance2);
+  const float inverse = 1 / out.distance;
+  out.wi = d * inverse;
+  cosLight *= inverse;
+  out.radiance = e.textured ? scene_.coveredEmission(scene_.mesh(e.mesh), e.triangle, b1, b2) : e.meanRadiance;
+  out.pdfW = distance2 / (cosLight * e.area);
+  out.delta = false;
+  return out.pdfW > 0 && std::isfinite(out.pdfW);
+}
+
+bool LightSampler::samplePunctual(const PunctualLight& light, const Vec3& p, LightSample& out) const {
+  const Vec3 d = light.position - p;
+  const float distance2 = glm::dot(d, d);
+  if (!(distance2 > 0)) return false;
+  out.distance = std::sqrt(distance2);
+  out.wi = d / out.distance;
+  out.radiance = light.intensity / distance2 * rangeWindow(light, out.distance);
+  if (light.kind == PunctualKind::Spot) out.radiance *= spotFalloff(light, -glm::dot(out.wi, light.direction));
+  out.pdfW = 1;
+  out.delta = true;
+  return !isBlack(out.radiance) && isFinite(out.radiance);
+}
+
+bool LightSampler::sample(const Vec3& p, const Vec3& n, bool twoSided, float uSelect, Vec2 u, LightSample& out) const {
+  if (uSelect < probabilityFinite_) {
+    float select = std::min(uSelect / probabilityFinite_, kOneMinusEpsilon), probability = 0;
+    const size_t light =
+        hierarchy_ ? tree_.sample(p, n, twoSided, select, probability) : pick(cumulative_, select, probability);
+    if (!(probability > 0)) return false;
+    out.light = static_cast<uint32_t>(light);
+    const size_t emitters = scene_.emitters().size();
+    const bool ok = light < emitters ? sampleEmitter(scene_.emitters()[light], p, n, twoSided, u, out)
+                                     : samplePunctual(scene_.lights()[positional_[light - emitters]], p, out);
+    out.pdfW *= probability * probabilityFinite_;
+    return ok && out.pdfW > 0;
+  }
+  if (uSelect < probabilityFinite_ + probabilityDirectional_) {
+    float select = std::clamp((uSelect - probabilityFinite_) / probabilityDirectional_, 0.0f, kOneMinusEpsilon),
+          probability = 0;
+    const size_t index = pick(directionalCumulative_, select, probability);
+    const PunctualLight& light = scene_.lights()[directional_[index]];
+    out.light = firstDirectional() + static_cast<uint32_t>(index);
+    out.wi = -light.direction;
+    out.distance = kInfinity;
+    out.radiance = light.intensity;
+    out.pdfW = probability * probabilityDirectional_;
+    out.delta = true;
+    return out.pdfW > 0;
+  }
+  if (probabilityEnvironment_ == 0) return false;
+  out.pdfW = scene_.environment()->sample(u, out.wi) * probabilityEnvironment_;
+  if (!(out.pdfW > 0) || !std::isfinite(out.pdfW)) return false;
+  out.light = environmentLight();
+  out.distance = kInfinity;
+  out.radiance = scene_.environment()->radiance(out.wi);
+  out.delta = false;
+  return true;
+}
+
+float LightSampler::finiteProbability(const Vec3& p, const Vec3& n, bool twoSided, size_t light) const {
+  if (hierarchy_) return tree_.empty() ? 0 : tree_.probability(p, n, twoSided, static_cast<uint32_t>(light));
+  return cumulative_[light + 1] - cumulative_[light];
+}
+
+float LightSampler::pdfEmitter(const Vec3& p, const Vec3& n, bool twoSided, size_t index, float distance,
+                               float cosLight) const {
+  if (probabilityFinite_ == 0) return 0;
+  const float pdf = sqr(distance) / (cosLight * scene_.emitters()[index].area);
+  const float choice = finiteProbability(p, n, twoSided, index) * probabilityFinite_;
+  const float result = choice * pdf;
+  return std::isfinite(result) ? result : 0.0f;
+}
+
+float LightSampler::pdfDirect(uint32_t light, const Vec3& p, const Vec3& n, bool twoSided, const Vec3& toLight) const {
+  if (light < finite_) {
+    if (probabilityFinite_ == 0) return 0;
+    const float choice = finiteProbability(p, n, twoSided, light) * probabilityFinite_;
+    return light < firstPositional() ? choice / scene_.emitters()[light].area : choice;
+  }
+  if (light < environmentLight()) {
+    const size_t i = light - finite_;
+    return (directionalCumulative_[i + 1] - directionalCumulative_[i]) * probabilityDirectional_;
+  }
+  return pdfEnvironment(toLight);
+}
+
+float LightSampler::pdfEnvironment(const Vec3& direction) const {
+  if (probabilityEnvironment_ == 0) return 0;
+  const float pdf = scene_.environment()->pdfW(direction) * probabilityEnvironment_;
+  return std::isfinite(pdf) ? pdf : 0.0f;
+}
+
+}  // namespace braid

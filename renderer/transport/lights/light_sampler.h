@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// Next-event estimation: picks a light and a point or direction on it. Lights are numbered: emissive triangles first,
+// then punctual lights with a position, directional lights, the environment.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "renderer/core/vec.h"
+#include "renderer/scene/scene.h"
+#include "renderer/transport/lights/light_tree.h"
+
+namespace braid {
+
+struct LightSample {
+  Vec3 wi;               // unit, from the shading point to the light
+  float distance = 0;    // metres; infinity for directional lights and the environment
+  Spectrum radiance{0};  // arriving along wi, before visibility. Delta lights: already divided by distance²
+  float pdfW =
+      0;  // density per solid angle including the choice of the light; for delta lights the probability of the choice
+  bool delta = false;
+  uint32_t light = 0;  // number of the light, see LightSampler::size()
+};
+
+// How finite lights are chosen.
+enum class LightStrategy { Automatic, Power, Hierarchy };
+
+// Whether a light hierarchy is worth its cost: not for up to 8 emissive triangles (a few area lights), where choosing
+// by power is as good or better; yes as soon as distances and cones of several lights differ from point to point.
+bool hierarchyPays(size_t emissiveTriangles, size_t positionalLights);
+
+class LightSampler {
+ public:
+  // Automatic: see hierarchyPays().
+  LightSampler(const Scene& scene, LightStrategy strategy);
+
+  // Samples a light for the point p with shading normal n (not zero unless twoSided); `twoSided`: the surface
+  // transmits. False: no light can contribute.
+  bool sample(const Vec3& p, const Vec3& n, bool twoSided, float uSelect, Vec2 u, LightSample& out) const;
+
+  // Density with which sample() would pick the direction to a point hit on emitter `index` (distance in metres, cosine
+  // at the light > 0).
+  float pdfEmitter(const Vec3& p, const Vec3& n, bool twoSided, size_t index, float distance, float cosLight) const;
+  float pdfEnvironment(const Vec3& direction) const;
+
+  // Density with which sample() at a receiver picks a point of a light: per m² for emissive triangles, per solid angle
+  // about `toLight` for the environment, a probability for the others.
+  float pdfDirect(uint32_t light, const Vec3& p, const Vec3& n, bool twoSided, const Vec3& toLight) const;
+
+  // Lights in all, and where each kind begins in the numbering.
+  uint32_t size() const { return environmentLight() + (scene_.environment() ? 1u : 0u); }
+  uint32_t firstPositional() const { return static_cast<uint32_t>(scene_.emitters().size()); }
+  uint32_t firstDirectional() const { return static_cast<uint32_t>(finite_); }
+  uint32_t environmentLight() const { return static_cast<uint32_t>(finite_ + directional_.size()); }
+  const PunctualLight& positional(uint32_t light) const {
+    return scene_.lights()[positional_[light - firstPositional()]];
+  }
+  const PunctualLight& directional(uint32_t light) const {
+    return scene_.lights()[directional_[light - firstDirectional()]];
+  }
+
+  size_t finiteLights() const { return finite_; }
+  bool usesHierarchy() const { return hierarchy_; }
+  size_t bytes() const { return tree_.bytes() + cumulative_.size() * sizeof(float); }
+
+ private:
+  bool sampleEmitter(const EmissiveTriangle& e, const Vec3& p, const Vec3& n, bool twoSided, Vec2 u,
+                     LightSample& out) const;
+  bool samplePunctual(const PunctualLight& light, const Vec3& p, LightSample& out) const;
+  float finiteProbability(const Vec3& p, const Vec3& n, bool twoSided, size_t light) const;
+
+  const Scene& scene_;
+  size_t finite_ = 0;
+  bool hierarchy_ = false;
+  LightTree tree_;
+  std::vector<float> cumulative_;     // by power, when there is no hierarchy
+  std::vector<uint32_t> positional_;  // punctual lights with a position
+  std::vector<uint32_t> directional_;
+  std::vector<float> directionalCumulative_;
+  float probabilityFinite_ = 0, probabilityDirectional_ = 0, probabilityEnvironment_ = 0;
+};
+
+// What the range of a light leaves of it at a distance, in [0, 1]: the window of KHR_lights_punctual, which ends
+// without an edge. The distance is that of the straight way from the light to the first surface that scatters.
+inline float rangeWindow(const PunctualLight& light, float distance) {
+  if (!(light.range < kInfinity)) return 1;
+  return std::max(1 - sqr(sqr(distance / light.range)), 0.0f);
+}
+
+// Spot attenuation of KHR_lights_punctual for the cosine between the axis and the direction from the light, in [0, 1].
+float spotFalloff(const PunctualLight& light, float cosAngle);
+
+}  // namespace braid

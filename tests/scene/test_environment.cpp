@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+// The environment: directions that are drawn against the density that is claimed.
+#include <functional>
+
+#include <doctest/doctest.h>
+
+#include "renderer/scene/environment.h"
+#include "tests/support/counts.h"
+
+namespace braid::test_environment {
+
+using test::Rng;
+
+namespace {
+
+// All tests of a case together raise a false alarm with this probability; the seeds are fixed.
+constexpr double kFalseAlarm = 1e-3;
+
+Vec3 randomDirection(Rng& rng) { return squareToUniformSphere(rng.next2()); }
+
+EnvironmentData environmentImage(int width, int height, const std::function<Spectrum(int, int)>& color) {
+  auto image = std::make_shared<Image>();
+  image->width = width;
+  image->height = height;
+  image->channels = 3;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      for (int c = 0; c < 3; ++c) image->floats.push_back(color(x, y)[c]);
+  EnvironmentData data;
+  data.image = image;
+  data.radiance = Spectrum(1);
+  return data;
+}
+
+struct EnvironmentTest {
+  double pValue, integral;
+};
+
+// Chi-squared test over cells of latitude and longitude, four to a texel. Each cell's ∫ pdf dω is a midpoint rule of
+// pdf sin θ, which is constant within a texel.
+EnvironmentTest testEnvironment(const Environment& environment, int width, int height, float rotation, Rng& rng) {
+  const int columns = 2 * width, rows = 2 * height, count = 60000;
+  std::vector<double> expected(static_cast<size_t>(columns * rows)), observed(expected.size());
+  EnvironmentTest result{0, 0};
+  const double area = static_cast<double>(2 * kPi * kPi) / (columns * rows);
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x) {
+      // The image's centre lies at +X; longitude grows to its right, toward +Z.
+      const float theta = kPi * (static_cast<float>(y) + 0.5f) / static_cast<float>(rows);
+      const float phi = 2 * kPi * ((static_cast<float>(x) + 0.5f) / static_cast<float>(columns) - 0.5f) - rotation;
+      const Vec3 w(std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi));
+      const double share = static_cast<double>(environment.pdfW(w) * std::sin(theta)) * area;
+      expected[static_cast<size_t>(y * columns + x)] = share * count;
+      result.integral += share;
+    }
+  for (int i = 0; i < count; ++i) {
+    Vec3 w;
+    if (!(environment.sample(rng.next2(), w) > 0)) continue;
+    const float turn = (std::atan2(w.z, w.x) + rotation) / (2 * kPi) + 0.5f;
+    const int x = static_cast<int>((turn - std::floor(turn)) * static_cast<float>(columns));
+    const int y = static_cast<int>(std::acos(std::clamp(w.y, -1.0f, 1.0f)) / kPi * static_cast<float>(rows));
+    observed[static_cast<size_t>(std::min(y, rows - 1) * columns + std::min(x, columns - 1))] += 1;
+  }
+  result.pValue = test::pValueOf(observed, expected);
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("Environment images are sampled with the density that is stated") {
+  Rng rng(8);
+  constexpr int kTests = 6;
+  const auto noise = [&](int, int) { return Spectrum(rng.next(), std::exp(4 * rng.next()), rng.next()); };
+  const auto gradient = [](int x, int y) { return Spectrum(static_cast<float>(x + 4 * y)); };
+  const auto sun = [](int x, int y) { return Spectrum(x == 11 && y == 5 ? 1e9f : 1.0f); };
+  const auto half = [](int, int y) { return Spectrum(y < 4 ? 1.0f : 0.0f); };
+  EnvironmentData cases[kTests] = {environmentImage(16, 8, noise),     environmentImage(16, 8, noise),
+                                   environmentImage(24, 12, gradient), environmentImage(32, 16, sun),
+                                   environmentImage(16, 8, half),      environmentImage(8, 4, noise)};
+  cases[1].rotation = 1.2f;
+  for (int i = 0; i < kTests; ++i) {
+    const EnvironmentTest result =
+        testEnvironment(Environment(cases[i]), cases[i].image->width, cases[i].image->height, cases[i].rotation, rng);
+    CAPTURE(i);
+    CHECK(result.integral == doctest::Approx(1).epsilon(1e-5));
+    CHECK(result.pValue > test::sidak(kFalseAlarm, kTests + 1));
+  }
+  EnvironmentData constant;
+  constant.radiance = Spectrum(2);
+  const Environment sky(constant);
+  const auto sample = [&](Rng& r) {
+    Vec3 w;
+    return sky.sample(r.next2(), w) > 0 ? std::optional<Vec3>(w) : std::nullopt;
+  };
+  const test::ChiSquared result = test::chiSquared(
+      sample, [&](const Vec3& w) { return sky.pdfW(w); }, 1);
+  CHECK(result.integral == doctest::Approx(1).epsilon(1e-5));
+  CHECK(result.pValue > test::sidak(kFalseAlarm, kTests + 1));
+}
+
+TEST_CASE("Every direction from which the environment shines can be drawn") {
+  Rng rng(9);
+  const Environment environment(
+      environmentImage(16, 8, [&](int x, int y) { return Spectrum((x * 7 + y * 3) % 5 == 0 ? 1.0f : 0.0f); }));
+  int missing = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Vec3 w = randomDirection(rng);
+    missing += luminance(environment.radiance(w)) > 0 && !(environment.pdfW(w) > 0);
+  }
+  CHECK(missing == 0);
+}
+
+TEST_CASE("A black environment is never drawn, and a rotated one turns about the vertical") {
+  const Environment black(environmentImage(4, 2, [](int, int) { return Spectrum(0); }));
+  Vec3 w;
+  CHECK(black.sample(Vec2(0.3f), w) == 0);
+  CHECK(black.pdfW({0, 1, 0}) == 0);
+  EnvironmentData constant;
+  CHECK(Environment(constant).sample(Vec2(0.3f), w) == 0);
+
+  EnvironmentData data =
+      environmentImage(64, 32, [](int x, int y) { return Spectrum(x == 40 && y == 12 ? 1.0f : 0.0f); });
+  const Environment still(data);
+  data.rotation = 0.7f;
+  const Environment turned(data);
+  still.sample(Vec2(0.5f), w);
+  const Vec3 moved(glm::rotate(Mat4(1), 0.7f, Vec3(0, 1, 0)) * Vec4(w, 0));
+  CHECK(luminance(still.radiance(w)) > 0);
+  CHECK(turned.radiance(moved).x == doctest::Approx(still.radiance(w).x).epsilon(1e-3));
+  CHECK(turned.pdfW(moved) == doctest::Approx(still.pdfW(w)).epsilon(1e-3));
+}
+
+TEST_CASE("An environment lies as in three.js and in Blender: its centre in +X, its right in +Z, its top in +Y") {
+  const auto only = [](int column, int row) {
+    return Environment(
+        environmentImage(8, 4, [=](int x, int y) { return Spectrum(x == column && y == row ? 1.0f : 0.0f); }));
+  };
+  // The middle of texel (x, y) of 8 x 4: u = atan2(z, x) / 2 pi + 1/2, v = acos(y) / pi.
+  const auto middle = [](int x, int y) {
+    const float phi = 2 * kPi * ((static_cast<float>(x) + 0.5f) / 8 - 0.5f),
+                theta = kPi * (static_cast<float>(y) + 0.5f) / 4;
+    return Vec3(std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi));
+  };
+  for (const auto& [x, y] : {std::pair(4, 1), std::pair(6, 2), std::pair(0, 0), std::pair(2, 3)}) {
+    CHECK(only(x, y).radiance(middle(x, y)).x == doctest::Approx(1).epsilon(1e-4));
+    CHECK(only(x, y).radiance(-middle(x, y)).x == 0);
+  }
+  // Half a texel around: bright between +X and +Z, right of the centre.
+  CHECK(only(4, 2).radiance(glm::normalize(Vec3(1, -0.4f, 0.3f))).x > 0.5f);
+  CHECK(only(5, 1).radiance(glm::normalize(Vec3(0.3f, 0.4f, 1))).x > 0.5f);
+  CHECK(only(5, 1).radiance(glm::normalize(Vec3(0.3f, 0.4f, -1))).x == 0);
+}
+
+TEST_CASE("A sun of one texel takes almost all samples and its neighbourhood keeps the rest") {
+  const Environment environment(
+      environmentImage(256, 128, [](int x, int y) { return Spectrum(x == 90 && y == 40 ? 1e9f : 1.0f); }));
+  Rng rng(10);
+  double mean = 0;
+  constexpr int kSamples = 20000;
+  for (int i = 0; i < kSamples; ++i) {
+    Vec3 w;
+    const float pdf = environment.sample(rng.next2(), w);
+    REQUIRE(pdf > 0);
+    mean += static_cast<double>(average(environment.radiance(w)) / pdf) / kSamples;
+  }
+  // ∫ L over the sphere. Bilinear interpolation within texels of constant density: a standard deviation of about 1.
+  CHECK(mean == doctest::Approx(static_cast<double>(4 * kPi * average(environment.average()))).epsilon(0.05));
+}
+
+}  // namespace braid::test_environment

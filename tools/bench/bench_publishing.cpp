@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/bench/bench_publishing.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <ctime>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "integrators/registry.h"
+#include "renderer/core/stopwatch.h"
+#include "renderer/session/session.h"
+#include "tools/options/combining.h"
+#include "tools/publish/exr_metadata.h"
+#include "tools/publish/publisher.h"
+
+namespace braid {
+
+namespace {
+
+struct Cost {
+  double seconds = 0, processor = 0;
+  double publishing = 0, combining = 0, writing = 0;  // seconds of the run: on the way, and at its end
+};
+
+template <class Task>
+Cost costOf(const Task& task) {
+  const Stopwatch clock;
+  const std::clock_t begin = std::clock();
+  task();
+  Cost cost;
+  cost.seconds = clock.seconds();
+  cost.processor = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  return cost;
+}
+
+Cost median(std::vector<Cost> costs) {
+  const auto middle = [&](double Cost::*part) {
+    std::sort(costs.begin(), costs.end(), [&](const Cost& a, const Cost& b) { return a.*part < b.*part; });
+    return costs[costs.size() / 2].*part;
+  };
+  return {middle(&Cost::seconds), middle(&Cost::processor), middle(&Cost::publishing), middle(&Cost::combining),
+          middle(&Cost::writing)};
+}
+
+class TemporaryFile {
+ public:
+  TemporaryFile() : path_(std::filesystem::temp_directory_path() / fmt::format("braid-bench-{}.exr", ::getpid())) {}
+  ~TemporaryFile() {
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);
+  }
+  std::string path() const { return path_.string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace
+
+nlohmann::json benchPublishing(const Scene& scene, const CameraData& camera, const Settings& settings,
+                               const std::string& methods, int repeats) {
+  const auto integrators = makeIntegrators();
+  Plan plan = makePlan(scene, camera, settings, pointersTo(integrators));
+  const TemporaryFile file;
+  PublishOptions options;
+  options.image.file = file.path();
+  options.image.aovs = "all";
+  options.image.combine.combine = methods;
+  options.threads = settings.threads;
+  requireRunnable(planCombining(options.image.combine, settings.spp, plan), options.image.combine.wanted());
+  std::vector<Cost> alone, published;
+  int publications = 0, combined = 0;
+  WrittenImage last;
+  for (int k = 0; k < repeats; ++k) {
+    alone.push_back(costOf([&] {
+      Session session(scene, plan);
+      session.advance();
+      ImageOutput plain = options.image;
+      plain.combine.combine = "none";
+      const std::optional<Plane<float>> alpha = session.alpha();
+      Estimates estimates = describedEstimates(session, true);
+      last = writeImage(plain, estimates, alpha ? &*alpha : nullptr, settings.threads);
+    }));
+    alone.back().writing = last.writeSeconds;
+    double spent = 0;
+    published.push_back(costOf([&] {
+      Session session(scene, plan);
+      Publisher publisher(options, session);
+      session.advance([&](const Progress& p) {
+        for (const Publication& news : publisher.round(p)) {
+          publications += news.image.cancelled || !news.failure.empty() ? 0 : 1;
+          combined += news.combined && !news.image.cancelled ? 1 : 0;
+        }
+        return true;
+      });
+      last = publisher.finish();
+      spent = publisher.spent();
+    }));
+    published.back().publishing = spent;
+    published.back().combining = last.combineSeconds;
+    published.back().writing = last.writeSeconds;
+  }
+  const Cost a = median(alone), p = median(published);
+  const double more = p.publishing + p.combining + std::max(0.0, p.writing - a.writing);
+  return {{"spp", settings.spp},
+          {"methods", methods},
+          {"seconds", a.seconds},
+          {"publishedSeconds", p.seconds},
+          {"overhead", p.seconds / a.seconds - 1},
+          {"share", more / p.seconds},
+          {"publishingSeconds", p.publishing},
+          {"lastCombineSeconds", p.combining},
+          {"lastWriteSeconds", p.writing},
+          {"plainWriteSeconds", a.writing},
+          {"processorSeconds", a.processor},
+          {"publishedProcessorSeconds", p.processor},
+          {"processorOverhead", p.processor / a.processor - 1},
+          {"publications", static_cast<double>(publications) / repeats + 1},
+          {"combinedPublications", static_cast<double>(combined) / repeats + 1}};
+}
+
+}  // namespace braid

@@ -1,0 +1,348 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/commands/farm_job.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "renderer/core/error.h"
+
+namespace braid {
+
+namespace {
+
+using Words = std::vector<std::string>;
+
+// A file name where an option could stand.
+std::string operand(const std::string& file) { return file.starts_with('-') ? "./" + file : file; }
+
+std::string stemOf(const std::string& output) {
+  return output.ends_with(".exr") ? output.substr(0, output.size() - 4) : output;
+}
+
+// --name=value, so that values may begin with a dash.
+void append(Words& words, const std::vector<FarmOption>& options) {
+  for (const FarmOption& o : options) words.push_back(o.value ? o.name + "=" + *o.value : o.name);
+}
+
+// `render` and its options, but for --passes, --checkpoint and --threads.
+Words renderWords(const FarmJob& job) {
+  Words words{"render", operand(job.scene)};
+  append(words, job.render);
+  words.push_back("--resume");
+  return words;
+}
+
+Words mergeOptions(const FarmJob& job) {
+  Words words{"--output=" + job.output};
+  append(words, job.merge);
+  if (job.threads > 0) words.push_back(fmt::format("--threads={}", job.threads));
+  return words;
+}
+
+Words shareWords(const FarmJob& job, uint64_t task, const PassInterval& passes) {
+  Words words = renderWords(job);
+  words.push_back(fmt::format("--passes={}:{}", passes.begin, passes.end));
+  words.push_back("--checkpoint=" + shareFile(job.output, task));
+  if (job.threads > 0) words.push_back(fmt::format("--threads={}", job.threads));
+  return words;
+}
+
+Words mergeWords(const FarmJob& job) {
+  Words words{"merge"};
+  for (uint64_t k = 0; k < job.tasks; ++k) words.push_back(operand(shareFile(job.output, k)));
+  for (const std::string& w : mergeOptions(job)) words.push_back(w);
+  return words;
+}
+
+std::string line(const Words& words) {
+  std::string text;
+  for (const std::string& w : words) text += (text.empty() ? "" : " ") + shellQuoted(w);
+  return text;
+}
+
+// A name that every scheduler takes: letters, digits and underscores.
+std::string jobName(const FarmJob& job) {
+  std::string name = "braid_" + std::filesystem::path(stemOf(job.output)).filename().string();
+  for (char& c : name)
+    if (!((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'))) c = '_';
+  return name;
+}
+
+std::string title(const FarmJob& job) {
+  return fmt::format("braid render of {}: {} samples per pixel in {} shares, and their merge to {}", job.scene, job.spp,
+                     job.tasks, job.output);
+}
+
+void requireCarriable(const FarmJob& job, FarmFormat format) {
+  Words words{job.program, job.folder};
+  for (const Words& more : {renderWords(job), mergeWords(job)}) words.insert(words.end(), more.begin(), more.end());
+  for (const std::string& w : words) {
+    if (std::any_of(w.begin(), w.end(), [](char c) { return (c >= 0 && c < ' ') || c == 127; }))
+      throw Error(ExitCode::Usage, "a job cannot carry control characters such as newlines: rename the file of " +
+                                       nlohmann::json(w).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace));
+    if (format != FarmFormat::OpenCue && format != FarmFormat::Flamenco) continue;
+    try {
+      (void)nlohmann::json(w).dump();
+    } catch (const nlohmann::json::exception&) {
+      throw Error(ExitCode::Usage,
+                  "a name that is not UTF-8 fits no Python or JavaScript text: rename it, or use "
+                  "--format slurm or make");
+    }
+  }
+}
+
+// The array's script runs braid as a child: bash has to stay, to ask for another turn when the time limit is near.
+std::string slurmText(const FarmJob& job, const std::vector<PassInterval>& shares) {
+  std::string passes;
+  for (const PassInterval& p : shares) passes += fmt::format("{}{}:{}", passes.empty() ? "" : " ", p.begin, p.end);
+  const std::string threads =
+      job.threads > 0 ? std::to_string(job.threads) : std::string("\"${SLURM_CPUS_ON_NODE:-0}\"");
+  return fmt::format(
+      R"(#!/bin/bash
+# {title}.
+#   bash THIS_FILE [options of sbatch for both jobs, such as --partition=long --time=8:00:00 --mem=16G]
+# A share that is requeued, or submitted again with this file, goes on from its checkpoint. Two minutes before the time
+# limit it saves and requeues itself.
+set -euo pipefail
+cd -- {folder}
+
+shares=$(sbatch --parsable --job-name={name} --array=0-{last} --requeue --signal=B:USR1@120{cpus} "$@" <<'END_OF_SHARE'
+#!/bin/bash
+cd -- {folder} || exit
+passes=({passes})
+signalled=
+again=
+trap 'signalled=yes' TERM  # Slurm sends it to braid as well, which saves and ends
+trap 'signalled=yes; again=yes; kill -TERM "$render"' USR1
+{program} {render} --passes="${{passes[SLURM_ARRAY_TASK_ID]}}" --checkpoint={stem}.shard"$SLURM_ARRAY_TASK_ID".state --threads={threads} &
+render=$!
+while true; do
+  wait "$render"
+  code=$?
+  [ -n "$signalled" ] || break
+  signalled=
+done
+if [ -n "$again" ] && [ "$code" -eq 130 ]; then exec scontrol requeue "$SLURM_JOB_ID"; fi
+exit "$code"
+END_OF_SHARE
+)
+shares=${{shares%%;*}}
+
+merge=$(sbatch --parsable --job-name={name}_merge --dependency="afterok:$shares" --kill-on-invalid-dep=yes{cpus} "$@" <<'END_OF_MERGE'
+#!/bin/bash
+cd -- {folder} && exec {program} {merge}{merge_threads}
+END_OF_MERGE
+) || {{ scancel "$shares"; exit 1; }}
+echo "shares: job $shares, merge: job ${{merge%%;*}}"
+)",
+      fmt::arg("title", title(job)), fmt::arg("folder", shellQuoted(job.folder)), fmt::arg("name", jobName(job)),
+      fmt::arg("last", job.tasks - 1), fmt::arg("passes", passes), fmt::arg("program", shellQuoted(job.program)),
+      fmt::arg("cpus", job.threads > 0 ? fmt::format(" --cpus-per-task={}", job.threads) : ""),
+      fmt::arg("render", line(renderWords(job))), fmt::arg("stem", shellQuoted(stemOf(job.output))),
+      fmt::arg("threads", threads), fmt::arg("merge", line(mergeWords(job))),
+      fmt::arg("merge_threads", job.threads > 0 ? "" : " --threads=" + threads));
+}
+
+// A Makefile's text for the shell.
+std::string makeQuoted(std::string text) {
+  for (size_t at = 0; (at = text.find('$', at)) != std::string::npos; at += 2) text.insert(at, "$");
+  return text;
+}
+
+// The targets are no files: a state is there from the first checkpoint on, finished or not.
+std::string makeText(const FarmJob& job, const std::vector<PassInterval>& shares) {
+  std::string names, rules;
+  const auto command = [&](const Words& words) {
+    return makeQuoted("cd -- " + shellQuoted(job.folder) + " && " + shellQuoted(job.program) + " " + line(words));
+  };
+  for (uint64_t k = 0; k < job.tasks; ++k) {
+    names += fmt::format(" share{}", k);
+    rules += fmt::format("share{}:\n\t{}\n", k, command(shareWords(job, k, shares[k])));
+  }
+  return fmt::format(
+      "# {}.\n"
+      "#   make -j4 -f THIS_FILE\n"
+      "# Four shares at a time, each with {}. Run again after an interruption, it goes on from the checkpoints.\n"
+      "SHELL = /bin/sh\n"
+      "merge:{}\n\t{}\n{}.PHONY: merge{}\n",
+      title(job),
+      job.threads > 0 ? fmt::format("--threads {}", job.threads) : "all processors unless plan gets --threads", names,
+      command(mergeWords(job)), rules, names);
+}
+
+// Cuebot replaces tokens such as #LAYER# in commands before a shell sees them: quotes after every # keep names whole.
+std::string withoutTokens(std::string text) {
+  for (size_t at = 0; (at = text.find('#', at)) != std::string::npos; at += 3) text.insert(at + 1, "''");
+  return text;
+}
+
+// One command for all frames, however many: Cuebot stores at most 4000 characters of it. Share k of n begins at
+// unit * (k * each + min(k, extra)), and the last one ends with the passes.
+std::string openCueText(const FarmJob& job, const std::vector<PassInterval>& shares) {
+  const auto words = [&](const Words& list) {
+    std::string text;
+    for (const std::string& w : list) text += " " + withoutTokens(shellQuoted(w));
+    return text;
+  };
+  const uint64_t unit = job.spp >= 4 * job.tasks ? 4 : job.spp >= 2 * job.tasks ? 2 : 1;
+  const std::string begin = fmt::format("cd -- {} && exec {}", withoutTokens(shellQuoted(job.folder)),
+                                        withoutTokens(shellQuoted(job.program)));
+  const std::string stem = withoutTokens(shellQuoted(stemOf(job.output)));
+  const std::string threads = job.threads > 0 ? std::to_string(job.threads) : "\"${CUE_THREADS:-0}\"";
+  const std::string render = fmt::format(
+      "k=$((#IFRAME#-1)); at() {{ echo $(($1==0 ? 0 : $1=={n} ? {spp} : {unit}*($1*{each}+($1<{extra}?$1:{extra})))); "
+      "}}; {begin}{words} --passes=$(at $k):$(at $((k+1))) --checkpoint={stem}.shard$k.state --threads={threads}",
+      fmt::arg("n", job.tasks), fmt::arg("spp", job.spp), fmt::arg("unit", unit),
+      fmt::arg("each", job.spp / unit / job.tasks), fmt::arg("extra", job.spp / unit % job.tasks),
+      fmt::arg("begin", begin), fmt::arg("words", words(renderWords(job))), fmt::arg("stem", stem),
+      fmt::arg("threads", threads));
+  const std::string merge =
+      fmt::format("set --; while [ $# -lt {} ]; do set -- \"$@\" {}.shard$#.state; done; {} merge \"$@\"{}{}",
+                  job.tasks, withoutTokens(shellQuoted(operand(stemOf(job.output)))), begin, words(mergeOptions(job)),
+                  job.threads > 0 ? "" : " --threads=" + threads);
+  Words commands;
+  for (const std::string& script : {render, merge}) {
+    // Not shellQuoted() of what holds tokens that are meant: its quotes stand before and after, not within them.
+    commands.push_back("/bin/sh -c " + shellQuoted(script));
+    if (commands.back().size() > 4000)
+      throw Error(ExitCode::Usage, fmt::format("OpenCue stores at most 4000 characters of a command, and this one has "
+                                               "{}: use shorter names",
+                                               commands.back().size()));
+  }
+  const std::string cores =
+      job.threads > 0 ? fmt::format(", threads={0}, cores={0}, overrideCores=True", job.threads) : "";
+  return fmt::format(
+      R"(#!/usr/bin/env python3
+# {title}.
+#   python3 THIS_FILE    where OpenCue's packages are installed; SHOW, SHOT and the like as for every outline
+# A share that is retried goes on from its checkpoint. The render hosts need braid and the folder, and no Python package.
+import outline
+import outline.cuerun
+import outline.modules.shell
+
+job = outline.Outline({name})
+shares = outline.modules.shell.Shell(
+    "shares", command=[{render}],
+    range="1-{n}", chunk=1, threadable=True{cores})
+merge = outline.modules.shell.Shell(
+    "merge", command=[{merge}],
+    range="1", chunk=1, threadable=True{cores})
+job.add_layer(shares)
+job.add_layer(merge)
+merge.depend_all(shares)
+outline.cuerun.launch(job, range="1-{n}", use_pycuerun=False)
+)",
+      fmt::arg("title", title(job)), fmt::arg("name", nlohmann::json(jobName(job)).dump()),
+      fmt::arg("n", shares.size()), fmt::arg("render", nlohmann::json(commands[0]).dump()),
+      fmt::arg("merge", nlohmann::json(commands[1]).dump()), fmt::arg("cores", cores));
+}
+
+// Workers run `exec` without a shell; env changes the folder.
+std::string flamencoText(const FarmJob& job, const std::vector<PassInterval>& shares) {
+  nlohmann::ordered_json data = {{"folder", job.folder}, {"program", job.program}, {"shares", {}}, {"merge", {}}};
+  for (uint64_t k = 0; k < job.tasks; ++k)
+    data["shares"].push_back({{"name", fmt::format("passes {}:{}", shares[k].begin, shares[k].end)},
+                              {"args", shareWords(job, k, shares[k])}});
+  data["merge"] = {{"name", "merge"}, {"args", mergeWords(job)}};
+  return fmt::format(
+      R"(// {title}.
+// Save as {name}.js in the folder `scripts` beside Flamenco Manager, then submit:
+//   curl -H 'Content-Type: application/json' http://MANAGER:8080/api/v3/jobs -d \
+//     '{{"name": "{name}", "type": "{type}", "priority": 50, "submitter_platform": "linux", "settings": {{}}}}'
+// A share that is run again goes on from its checkpoint.
+const DATA = {data};
+
+const JOB_TYPE = {{
+  label: {label},
+  settings: [
+    {{ key: "program", type: "string", default: DATA.program, description: "The braid that workers run" }},
+  ],
+}};
+
+function makeTask(job, step, type) {{
+  const program = job.settings.program || DATA.program;
+  const task = author.Task(step.name, type);
+  task.addCommand(author.Command("exec", {{ exe: "env", args: ["-C", DATA.folder, program].concat(step.args) }}));
+  return task;
+}}
+
+function compileJob(job) {{
+  const merge = makeTask(job, DATA.merge, "misc");
+  for (let i = 0; i < DATA.shares.length; i++) {{
+    const share = makeTask(job, DATA.shares[i], "misc");
+    job.addTask(share);
+    merge.addDependency(share);
+  }}
+  job.addTask(merge);
+}}
+)",
+      fmt::arg("title", title(job)), fmt::arg("name", jobName(job)),
+      fmt::arg("type",
+               [&] {
+                 std::string type = jobName(job);
+                 std::replace(type.begin(), type.end(), '_', '-');
+                 return type;
+               }()),
+      // Escaped, for JavaScript ends lines at characters that JSON does not.
+      fmt::arg("data", data.dump(2, ' ', true)),
+      fmt::arg("label", nlohmann::json("braid: " + job.output).dump(-1, ' ', true)));
+}
+
+}  // namespace
+
+FarmFormat parseFarmFormat(const std::string& name) {
+  if (name == "slurm") return FarmFormat::Slurm;
+  if (name == "opencue") return FarmFormat::OpenCue;
+  if (name == "flamenco") return FarmFormat::Flamenco;
+  if (name == "make") return FarmFormat::Make;
+  throw Error(ExitCode::Usage, "unknown format '" + name + "': known are slurm, opencue, flamenco, make");
+}
+
+std::vector<PassInterval> splitPasses(uint64_t spp, uint64_t tasks) {
+  if (tasks == 0 || tasks > spp)
+    throw Error(ExitCode::Usage, fmt::format("--tasks {}: expected 1 to {}, a pass or more for each", tasks, spp));
+  const uint64_t unit = spp / 4 >= tasks ? 4 : spp / 2 >= tasks ? 2 : 1;
+  const uint64_t units = spp / unit, each = units / tasks, extra = units % tasks;
+  std::vector<PassInterval> shares;
+  for (uint64_t k = 0; k < tasks; ++k) {
+    const uint64_t begin = shares.empty() ? 0 : shares.back().end;
+    shares.push_back({begin, k + 1 == tasks ? spp : begin + unit * (each + (k < extra ? 1 : 0))});
+  }
+  return shares;
+}
+
+std::string shareFile(const std::string& output, uint64_t task) {
+  return fmt::format("{}.shard{}.state", stemOf(output), task);
+}
+
+std::string shellQuoted(const std::string& text) {
+  const auto plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+           std::string_view("_./:=,+@%-").find(c) != std::string_view::npos;
+  };
+  if (!text.empty() && std::all_of(text.begin(), text.end(), plain)) return text;
+  std::string quoted = "'";
+  for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
+}
+
+std::string farmJobText(const FarmJob& job, FarmFormat format) {
+  const std::vector<PassInterval> shares = splitPasses(job.spp, job.tasks);
+  requireCarriable(job, format);
+  switch (format) {
+    case FarmFormat::Slurm:
+      return slurmText(job, shares);
+    case FarmFormat::OpenCue:
+      return openCueText(job, shares);
+    case FarmFormat::Flamenco:
+      return flamencoText(job, shares);
+    case FarmFormat::Make:
+      return makeText(job, shares);
+  }
+  return {};
+}
+
+}  // namespace braid

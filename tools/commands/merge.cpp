@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+// `braid merge`: the states of several machines' shares become one, as if one machine had rendered all passes.
+#include <algorithm>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "combiners/pipeline/registry.h"
+#include "renderer/core/error.h"
+#include "renderer/film/files/state_file.h"
+#include "tools/options/cli.h"
+#include "tools/options/file_uses.h"
+#include "tools/publish/exr_metadata.h"
+#include "tools/publish/image_output.h"
+#include "tools/options/option_checks.h"
+#include "tools/options/output_options.h"
+
+namespace braid {
+
+namespace {
+
+struct MergeOptions {
+  std::vector<std::string> parts;
+  ImageOutput image;
+  std::string checkpoint;
+  int threads = 0;
+  bool quiet = false;
+};
+
+struct Part {
+  std::string file;
+  FilmState header;  // without planes
+};
+
+// The parts by their first passes. Throws Error(BadInput) with a sentence for two that do not go together.
+std::vector<Part> sortedParts(const std::vector<std::string>& files, bool quiet) {
+  std::vector<Part> parts;
+  for (const std::string& file : files) parts.push_back({file, readStateHeader(file)});
+  std::stable_sort(parts.begin(), parts.end(), [](const Part& a, const Part& b) {
+    return a.header.estimates.front().firstPass() < b.header.estimates.front().firstPass();
+  });
+  const Part& first = parts.front();
+  for (size_t i = 1; i < parts.size(); ++i) {
+    const std::string differs = difference(first.header.identity, parts[i].header.identity, false);
+    if (!differs.empty())
+      throw Error(ExitCode::BadInput,
+                  fmt::format("{} and {} are not shares of one render: {}: render them with the same options",
+                              first.file, parts[i].file, differs));
+    const std::string bits = difference(first.header.identity, parts[i].header.identity, true);
+    if (!bits.empty() && !quiet) fmt::print(stderr, "note: {} and {}: {}\n", first.file, parts[i].file, bits);
+    for (size_t j = 0; j < i; ++j) {
+      const std::string both = overlap(parts[j].header, parts[i].header);
+      if (!both.empty())
+        throw Error(ExitCode::BadInput,
+                    fmt::format("{} and {} overlap: {}: leave one of them out", parts[j].file, parts[i].file, both));
+    }
+  }
+  return parts;
+}
+
+// Equal options make states of one kind, unless a file was tampered with.
+void requireOneKind(const FilmState& a, const FilmState& b, const std::string& file) {
+  bool same = a.estimates.size() == b.estimates.size() && a.buckets == b.buckets && a.window == b.window &&
+              a.features.has_value() == b.features.has_value() && a.coverage.has_value() == b.coverage.has_value();
+  for (size_t i = 0; same && i < a.estimates.size(); ++i)
+    same = a.estimates[i].name == b.estimates[i].name &&
+           a.estimates[i].sums.keepsBias() == b.estimates[i].sums.keepsBias() &&
+           a.estimates[i].parts.has_value() == b.estimates[i].parts.has_value();
+  if (!same) throw Error(ExitCode::BadInput, file + ": what it holds is not what its options say: use another copy");
+}
+
+// One part in memory beside the sum. The order of adding is that of the passes, so that bits do not depend on the order
+// on the command line.
+FilmState sumOf(const std::vector<Part>& parts) {
+  FilmState sum = readStateFile(parts.front().file);
+  for (size_t i = 1; i < parts.size(); ++i) {
+    const FilmState next = readStateFile(parts[i].file);
+    requireOneKind(sum, next, parts[i].file);
+    addShare(sum, next);
+  }
+  return sum;
+}
+
+// Throws Error(BadInput) for a wanted method that cannot run on what the states hold.
+void requireInputs(const Estimates& estimates, const CombineChoice& choice) {
+  const CombinePlan combinePlan = makeCombinePlan(availableIn(estimates), choice.wanted(), choice.options().roles);
+  for (const std::string& name : choice.wanted())
+    if (const Step* step = combinePlan.find(name); step && !step->skipReason.empty())
+      throw Error(ExitCode::BadInput, fmt::format("{} cannot run on these shares: {}: render them with --combine {}",
+                                                  name, step->skipReason, name));
+}
+
+int runMerge(const MergeOptions& o) {
+  o.image.aovSet();
+  for (const std::string& name : o.image.combine.wanted()) makeCombinePlan({}, {name}, {});  // unknown names first
+  std::vector<std::string> outputs = o.image.files();
+  if (!o.checkpoint.empty()) outputs.push_back(o.checkpoint);
+  if (outputs.empty()) throw Error(ExitCode::Usage, "nothing to write: give -o OUT.exr, --png or --checkpoint");
+  FileUses uses;
+  for (const std::string& part : o.parts) uses.input("a share", part);
+  uses.methods(o.image.combine.combine);
+  uses.output("--output", o.image.file);
+  uses.output("--png", o.image.png);
+  uses.output("--checkpoint", o.checkpoint);
+  uses.check();
+  checkImageFiles(o.image);
+  if (!o.checkpoint.empty()) prepareOutput(o.checkpoint);
+
+  FilmState state = sumOf(sortedParts(o.parts, o.quiet));
+  const std::vector<PassInterval> passes = state.estimates.front().passes;
+  const uint64_t samples = state.estimates.front().sums.passes();
+  if (passes.empty()) throw Error(ExitCode::BadInput, o.parts.front() + ": holds no passes yet");
+  if (!o.checkpoint.empty()) writeStateFile(o.checkpoint, state);
+  WrittenImage written;
+  if (!o.image.files().empty()) {
+    Estimates estimates = describedEstimates(state, true, !o.image.noTiming);
+    requireInputs(estimates, o.image.combine);
+    const std::optional<Plane<float>> alpha =
+        state.coverage ? std::optional(state.coverage->mean()) : std::optional<Plane<float>>();
+    state = {};  // what it held is what combiners take
+    written = writeImage(o.image, estimates, alpha ? &*alpha : nullptr, o.threads);
+  }
+  if (o.quiet) return 0;
+  for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
+  for (const std::string& text : written.timings) fmt::print(stderr, "{}\n", text);
+  for (const std::string& file : outputs) fmt::print(stderr, "Saved: {}\n", file);
+  std::string intervals;
+  for (const PassInterval& i : passes)
+    intervals += fmt::format("{}{}:{}", intervals.empty() ? "" : " and ", i.begin, i.end);
+  fmt::print(stderr, "{} spp of {} shares, passes {}{}\n", samples, o.parts.size(), intervals,
+             written.error ? fmt::format(", estimated error {:.3g}", *written.error) : "");
+  return 0;
+}
+
+}  // namespace
+
+void addMerge(CLI::App& app, Action& action) {
+  auto options = std::make_shared<MergeOptions>();
+  MergeOptions& o = *options;
+  CLI::App* command = app.add_subcommand("merge", "Add the shares of several machines to one image");
+  command->footer(
+      "Examples:\n"
+      "  braid merge part0.state part1.state part2.state -o out.exr\n"
+      "  braid merge part*.state -o out.exr --combine auto --checkpoint all.state");
+  command->add_option("PART", o.parts, "States that `braid render --passes A:B --checkpoint PART` wrote")
+      ->required()
+      ->type_name("FILE");
+  o.image.aovs = "all";
+  addImageOptions(*command, o.image);
+  command->add_option("--checkpoint", o.checkpoint, "Also write the sum as a state, to resume or merge on")
+      ->type_name("FILE");
+  addThreads(*command, o.threads);
+  command->add_flag("-q,--quiet", o.quiet, "Errors only");
+  command->callback([options, &action] { action = [options] { return runMerge(*options); }; });
+}
+
+}  // namespace braid

@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+// `braid preview`: watch a scene converge, in a browser or in tev; noisy, combined and error side by side.
+#include <sys/resource.h>
+
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "integrators/registry.h"
+#include "renderer/core/error.h"
+#include "renderer/core/stopwatch.h"
+#include "renderer/film/files/output_file.h"
+#include "tools/options/cli.h"
+#include "tools/options/combining.h"
+#include "tools/options/file_uses.h"
+#include "tools/publish/exr_metadata.h"
+#include "tools/run/interrupt.h"
+#include "tools/options/option_checks.h"
+#include "tools/preview/preview_board.h"
+#include "tools/preview/preview_feed.h"
+#include "tools/preview/preview_server.h"
+#include "tools/run/progress_line.h"
+#include "tools/publish/publisher.h"
+#include "tools/publish/render_plan.h"
+#include "tools/publish/scene_identity.h"
+#include "tools/publish/tev_client.h"
+#include "version.h"
+
+namespace braid {
+
+namespace {
+
+constexpr int kPort = 8080;           // when nothing is said, and it is free
+constexpr double kFarewell = 3;       // seconds for which the end is shown to whoever watches
+constexpr double kWatchedWithin = 3;  // seconds since the last question of a page
+
+struct PreviewOptions {
+  SceneChoice scene;
+  SampleChoice samples;
+  ImageOutput image;
+  std::string tev;
+  int port = -1;  // -1: none is asked for
+};
+
+Settings previewSettings(const PreviewOptions& o) {
+  Settings settings = makeSettings(o.scene, o.samples);
+  if (o.samples.spp == 0 && o.samples.time.empty()) settings.spp = 0;  // until it is stopped
+  settings.features = o.image.aovSet() != AovSet::None;
+  settings.quarters = o.image.quarters;
+  settings.history = o.image.history;
+  settings.directIndirect = o.image.directIndirect;
+  return settings;
+}
+
+// Whoever watches: pages by way of the board, and tev.
+class Audience {
+ public:
+  Audience(const PreviewOptions& o, std::atomic<bool>& stop)
+      : quiet_(o.scene.quiet),
+        title_(std::filesystem::path(o.scene.file).filename().string()),
+        board_(title_, o.image.files(), o.image.exposure) {
+    if (!o.tev.empty()) tev_.emplace(o.tev);
+    if (o.port < 0 && tev_) return;
+    serve(o.port, [&stop] { stop = true; });
+    std::FILE* to = o.image.file == kStandardOutput || o.image.png == kStandardOutput ? stderr : stdout;
+    fmt::print(to, "{}\n", server_->url());
+    std::fflush(to);
+  }
+
+  PreviewBoard& board() { return board_; }
+
+  void show(uint64_t spp, double seconds, const ImageViews& views) {
+    board_.show(spp, seconds, views);
+    if (tev_) showInTev(*tev_, title_, views);
+  }
+
+  void warn(const std::string& text) {
+    board_.warn(text);
+    if (!quiet_) fmt::print(stderr, "warning: {} (the render goes on)\n", text);
+  }
+
+  void passWarningsOn() {
+    if (!tev_) return;
+    if (const std::string text = tev_->takeWarning(); !text.empty()) warn(text);
+  }
+
+  // Gives pages the time to fetch the last images.
+  void sayFarewell(const std::atomic<bool>& interrupted) const {
+    const Stopwatch clock;
+    while (server_ && server_->watched(kWatchedWithin) && !interrupted && clock.seconds() < kFarewell)
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+
+ private:
+  void serve(int port, const std::function<void()>& stop) {
+    if (port < 0) {
+      try {
+        server_.emplace(board_, kPort, stop);
+        return;
+      } catch (const Error&) {
+        port = 0;
+      }
+    }
+    server_.emplace(board_, port, stop);
+  }
+
+  const bool quiet_;
+  const std::string title_;
+  PreviewBoard board_;
+  std::optional<TevClient> tev_;
+  std::optional<PreviewServer> server_;
+};
+
+void tellSaved(const PreviewOptions& o, const RunReport& result, const WrittenImage& written,
+               const std::string& reason) {
+  if (o.scene.quiet) return;
+  for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
+  for (const std::string& file : o.image.files()) fmt::print(stderr, "Saved: {}\n", file);
+  fmt::print(stderr, "{} spp in {}, {}stopped by {}\n", result.spp, formatSeconds(result.seconds),
+             written.error ? fmt::format("estimated error {:.3g}, ", *written.error) : "", reason);
+}
+
+// The last images, combined from all samples, to the files and to whoever watches. Without files an interrupted
+// preview ends at once.
+WrittenImage save(const PreviewOptions& o, const Session& session, const RunReport& result, Audience& audience,
+                  bool interrupted) {
+  if (interrupted && o.image.files().empty()) return {};
+  audience.board().setPhase(PreviewPhase::Saving);
+  ImageOutput output = o.image;
+  output.show = [&](const ImageViews& v) { audience.show(result.spp, result.seconds, v); };
+  Estimates estimates = describedEstimates(session, !o.image.noTiming);
+  return writeImage(output, estimates, nullptr, o.samples.threads);
+}
+
+void checkOutputs(const PreviewOptions& o) {
+  FileUses uses;
+  uses.scene(o.scene.file, o.scene.environment);
+  uses.output("--output", o.image.file);
+  uses.output("--png", o.image.png);
+  uses.check();
+  checkImageFiles(o.image);
+}
+
+int runPreview(PreviewOptions o) {
+  Settings settings = previewSettings(o);
+  checkOutputs(o);
+  const std::atomic<bool>& interrupted = installInterruptHandler();
+  std::atomic<bool> stop{false};
+  Audience audience(o, stop);
+  // From here on: the browser that shows the image, and the threads that serve it, go before those that make it, which
+  // inherit this.
+  setpriority(PRIO_PROCESS, 0, 5);
+
+  SceneData data = loadScene(o.scene);
+  const CameraData camera = chooseCamera(data, o.scene);
+  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
+  const auto integrators = makeIntegrators();
+  const RenderPlan plan =
+      planRender(*scene, camera, settings, pointersTo(integrators), o.image.combine, {settings.spp});
+  requireRunnable(plan.combinePlan, o.image.combine.wanted());
+  if (!plan.note.empty()) audience.warn(fmt::format("nothing is combined: {}", plan.note));
+  requireWithinLimit(plan.memory);
+  Session session(*scene, plan.plan);
+  session.identify(BRAID_VERSION, BRAID_BUILD_FLAGS, sceneIdentity(o.scene, scene->data()),
+                   planAttributes(*scene, session.plan(), scene->accel().isa()));
+  if (o.scene.verbose) fmt::print(stderr, "{}", plan.text());
+  audience.board().setPlan(plan.text(), o.image.combine.combine, static_cast<int>(session.plan().integrators.size()));
+  if (!session.plan().unreachable.empty()) audience.warn(session.plan().unreachable);
+  audience.board().setPhase(PreviewPhase::Rendering);
+
+  ProgressLine line(o.scene.quiet);
+  RunReport result;
+  {
+    PreviewFeed feed(
+        o.image.combine, session, settings.threads,
+        [&](uint64_t spp, double seconds, ImageViews v) {
+          // Light that is missing leaves no trace in the samples: their error is not known.
+          if (!session.plan().unreachable.empty()) v.noisyError = v.combinedError = nullptr;
+          audience.show(spp, seconds, v);
+        },
+        [&](const std::string& text) { audience.warn(text); });
+    result = session.advance(
+        [&](const Progress& p) {
+          feed.round(p);
+          audience.board().progress(p);
+          audience.passWarningsOn();
+          line.update(p);
+          return !stop;
+        },
+        &interrupted);
+  }
+  line.finish();
+  const bool cancelled = result.reason == StopReason::Cancelled && !stop;
+  const WrittenImage written = save(o, session, result, audience, cancelled);
+  const std::string reason = stop ? "the page" : cancelled ? "a signal" : toString(result.reason);
+  tellSaved(o, result, written, reason);
+  audience.board().end(reason, o.image.files());
+  audience.sayFarewell(interrupted);
+  return cancelled ? static_cast<int>(ExitCode::Interrupted) : 0;
+}
+
+}  // namespace
+
+void addPreview(CLI::App& app, Action& action) {
+  auto options = std::make_shared<PreviewOptions>();
+  PreviewOptions& o = *options;
+  o.scene.size = "640x360";
+  o.samples.integrators = "auto";
+  combineByDefault(o.image.combine);
+  CLI::App* command = app.add_subcommand("preview", "Watch a scene converge, in a browser or in tev");
+  command->footer(
+      "Without --spp and --time it goes on until it is stopped: by the button of the page, or by Ctrl-C.\n"
+      "Examples:\n"
+      "  braid preview scene.glb                                 (then open the address that it prints)\n"
+      "  braid preview scene.glb --http 8080 --size 1280x720 -o out.exr --png out.png\n"
+      "  braid preview scene.glb --http 0 --integrator pt,sppm --combine js@sppm --time 5m\n"
+      "  braid preview scene.glb --tev 127.0.0.1:14158\n"
+      "On another machine: ssh -L 8080:127.0.0.1:8080 HOST, then http://127.0.0.1:8080 here.");
+  addSceneOptions(*command, o.scene);
+  addSampleOptions(*command, o.samples);
+  addImageOptions(*command, o.image);
+  command
+      ->add_option("--http", o.port,
+                   fmt::format("Serve the page at this port of 127.0.0.1; 0: any that is free (default: {}, or any if "
+                               "that is taken; with --tev none)",
+                               kPort))
+      ->check(wholeNumber(0, 65535))
+      ->type_name("PORT");
+  command->add_option("--tev", o.tev, "Show the images in tev, which listens there")
+      ->check(readBy(parseTevAddress))
+      ->type_name("HOST:PORT");
+  command->callback([options, command, &action] {
+    noteWhoAsked(*command, options->image.combine);
+    action = [options] { return runPreview(*options); };
+  });
+}
+
+}  // namespace braid

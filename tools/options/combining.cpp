@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/options/combining.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "combiners/pipeline/denoise_cutoff.h"
+#include "combiners/pipeline/registry.h"
+#include "renderer/core/error.h"
+#include "renderer/core/parallel.h"
+#include "renderer/film/error_map.h"
+#include "tools/options/cli.h"
+#include "tools/options/option_checks.h"
+
+namespace braid {
+
+namespace {
+
+std::string join(const std::vector<std::string>& names) {
+  std::string text;
+  for (size_t i = 0; i < names.size(); ++i) text += (i == 0 ? "" : i + 1 == names.size() ? " and " : ", ") + names[i];
+  return text;
+}
+
+// What is known of an integrator's estimate before the render. Without a limit of rounds there will be enough of them.
+AvailableEstimate plannedEstimate(const PlannedIntegrator& p, uint64_t rounds) {
+  const uint64_t passes = rounds * static_cast<uint64_t>(p.passesPerRound);
+  const int checkpoints = rounds == 0 ? 64 : static_cast<int>(std::bit_width(rounds));  // after the rounds 1, 2, 4, ...
+  return {p.integrator->name(),
+          p.integrator->unbiased(),
+          p.integrator->correlation(),
+          passes,
+          true,
+          true,
+          passes == 0 || passes >= 4,
+          checkpoints,
+          {},
+          p.integrator->estimatesBias(),
+          p.integrator->separatesDirectLight()};
+}
+
+}  // namespace
+
+AvailableEstimates plannedEstimates(const Plan& plan, uint64_t samples) {
+  AvailableEstimates available;
+  available.features = plan.features;
+  for (const PlannedIntegrator& p : plan.integrators) {
+    AvailableEstimate e = plannedEstimate(p, samples);
+    e.quarters = e.quarters && plan.buckets == 4;
+    e.directIndirect = e.directIndirect && plan.directIndirect;
+    if (!plan.settings.history) e.checkpoints = 0;
+    for (const uint64_t stop : plan.settings.stops)
+      if (e.unbiased && (samples == 0 || stop < e.passes)) e.kept.push_back(stop);
+    available.estimates.push_back(std::move(e));
+  }
+  return available;
+}
+
+std::vector<std::string> CombineChoice::wanted() const {
+  return combine == "none" ? std::vector<std::string>{} : splitList(combine);
+}
+
+PipelineOptions CombineChoice::options(const std::atomic<bool>* cancel) const {
+  PipelineOptions o;
+  o.roles.biased = biased;
+  o.roles.bases = splitList(bases);
+  o.roles.denoisers = splitList(denoisers);
+  o.cancel = cancel;
+  const std::vector<OptionInfo> infos = allMethodOptions();
+  for (size_t i = 0; i < numbers.size() && i < infos.size(); ++i)
+    if (!std::isnan(numbers[i])) o.numbers.set(infos[i].name, numbers[i]);
+  o.roles.stop = stopPasses(o.numbers.number(kCurvesStop));
+  return o;
+}
+
+void addCombineOptions(CLI::App& command, CombineChoice& c) {
+  command
+      .add_option("--denoiser", c.denoisers, "Denoisers to run and keep, separated by commas, the preferred one first")
+      ->type_name("NAMES");
+  command
+      .add_option("--biased", c.biased,
+                  "Biased input of combiners: an estimate, a denoiser or another combiner (--list)")
+      ->type_name("NAME");
+  command.add_option("--bases", c.bases, "Images that ensembles choose from, by name, separated by commas")
+      ->type_name("NAMES");
+  command.add_flag("--weights", c.weights, "Also write the maps of weights that combiners worked out");
+  const std::vector<OptionInfo> infos = allMethodOptions();
+  c.numbers.assign(infos.size(), std::numeric_limits<double>::quiet_NaN());
+  for (size_t i = 0; i < infos.size(); ++i)
+    command
+        .add_option_function<double>(
+            "--" + infos[i].name, [&c, i](const double& value) { c.numbers[i] = value; },
+            fmt::format("{} (default {})", infos[i].description, infos[i].fallback))
+        ->check(numberOf(infos[i]))
+        ->group("Options of methods");
+}
+
+void combineByDefault(CombineChoice& choice) {
+  choice.combine = kDefaultMethod;
+  choice.asked = false;
+}
+
+void noteWhoAsked(const CLI::App& command, CombineChoice& choice) {
+  choice.asked = command.get_option("--combine")->count() > 0;
+}
+
+std::string methodList() {
+  std::string text;
+  for (const auto& [kind, title] :
+       {std::pair(MethodKind::Denoiser, "Denoisers"), {MethodKind::Combiner, "Combiners"}}) {
+    text += fmt::format("{}:\n", title);
+    for (const auto& m : makeMethods())
+      if (m->kind() == kind) text += fmt::format("  {:<18} {}\n", m->name(), m->description());
+  }
+  return text;
+}
+
+CombinePlan planCombining(const CombineChoice& choice, uint64_t samples, Plan& plan) {
+  if (choice.wanted().empty() && choice.denoisers.empty()) return {};
+  // By what could be kept, what has to be: quarters and history are of no use elsewhere.
+  AvailableEstimates available;
+  available.features = true;
+  for (const PlannedIntegrator& p : plan.integrators) available.estimates.push_back(plannedEstimate(p, samples));
+  CombinePlan combinePlan = makeCombinePlan(available, choice.wanted(), choice.options().roles);
+  const CombinePlanNeeds needs = needsOf(combinePlan);
+  keepAlso({needs.quarters, needs.features, needs.checkpoints > 0, needs.directIndirect, needs.stops}, plan);
+  return combinePlan;
+}
+
+std::string combinePlanText(const CombinePlan& combinePlan) {
+  std::string text;
+  for (const Step& s : combinePlan.steps) {
+    if (!s.skipReason.empty()) {
+      text += fmt::format("- {}: {}\n", s.name, s.skipReason);
+      continue;
+    }
+    std::vector<std::string> inputs{s.unbiased};
+    for (const std::string& name : {s.correlated, s.biased})
+      if (!name.empty()) inputs.push_back(name);
+    inputs.insert(inputs.end(), s.bases.begin(), s.bases.end());
+    text += fmt::format("+ {}: of {}\n", s.name, join(inputs));
+  }
+  return text;
+}
+
+PipelineResult runCombining(const Estimates& estimates, const CombineChoice& choice, const PipelineOptions& options,
+                            int threads) {
+  if (choice.wanted().empty() && choice.denoisers.empty()) return {};
+  PipelineResult result;
+  withThreads(threads, [&] { result = runPipeline(estimates, choice.wanted(), options); });
+  return result;
+}
+
+void requireRunnable(const CombinePlan& combinePlan, const std::vector<std::string>& wanted) {
+  for (const std::string& name : wanted)
+    if (const Step* step = combinePlan.find(name); step && !step->skipReason.empty())
+      throw Error(ExitCode::Usage, fmt::format("{} cannot run: {}", name, step->skipReason));
+}
+
+CombinedLayers::CombinedLayers(const PipelineResult& result, const std::vector<std::string>& wanted, bool weights,
+                               bool timing, Estimates& estimates) {
+  const PipelineOutput* last = nullptr;
+  for (const PipelineOutput& out : result.outputs) {
+    if (!out.ran()) continue;
+    const std::vector<Attribute> remarks = remarksOf(out, timing);
+    estimates.attributes.insert(estimates.attributes.end(), remarks.begin(), remarks.end());
+    // An image of fewer passes would be taken for that of all in the file.
+    if (out.step.method->kind() == MethodKind::Denoiser && out.step.kept == 0) {
+      Estimate e = out.result.image;
+      e.name = layerName(out.step.name);
+      std::erase_if(estimates.estimates, [&](const Estimate& old) { return old.name == e.name; });
+      const std::string prefix = "braid/" + e.name + "/";
+      std::erase_if(estimates.attributes,
+                    [&](const Attribute& a) { return a.name == prefix + "unbiased" || a.name == prefix + "passes"; });
+      estimates.attributes.push_back({prefix + "unbiased", Attribute::Kind::Int, "", 0, 0, {}});
+      estimates.attributes.push_back(
+          {prefix + "passes", Attribute::Kind::Int, "", static_cast<int64_t>(e.passes), 0, {}});
+      estimates.estimates.push_back(std::move(e));
+    }
+    if (weights)
+      for (const NamedPlane& p : out.result.aovs) add(p.name, nullptr, &p.plane);
+  }
+  for (const std::string& name : wanted) {
+    const PipelineOutput* out = result.find(name);
+    if (!out || !out->ran()) continue;
+    last = out;
+    add("combined." + layerName(name), &out->result.image.mean, nullptr);
+  }
+  if (!last) {
+    // An integrator is the headline.
+    if (!estimates.estimates.empty() && knowsError(estimates.estimates.front())) {
+      integratorsError_ = errorMap(estimates.estimates.front());
+      add("Error", nullptr, &integratorsError_);
+    }
+    return;
+  }
+  headline_ = &last->result.image.mean;
+  if (!last->result.error.empty()) add("Error", nullptr, &last->result.error);
+  estimates.attributes.push_back(
+      {"braid/headline", Attribute::Kind::String, "combined." + layerName(last->step.name), 0, 0, {}});
+  estimates.attributes.push_back({"braid/exposure", Attribute::Kind::Float, "", 0, result.exposure, {}});
+}
+
+void CombinedLayers::add(const std::string& name, const Rgb<float>* image, const Plane<float>* plane) {
+  if (std::none_of(list_.begin(), list_.end(), [&](const ExrLayer& l) { return l.name == name; }))
+    list_.push_back({name, image, plane});
+}
+
+std::vector<std::string> combineWarnings(const PipelineResult& result, bool asked) {
+  std::vector<std::string> lines;
+  const SanitiseReport& s = result.sanitised;
+  if (s.nonFinite > 0)
+    lines.push_back(
+        fmt::format("inputs of combiners: {} values are not finite and have no weight: {} pixels of colours are filled "
+                    "from the other half or their neighbours",
+                    s.nonFinite, s.filled));
+  if (s.negativeVariance > 0 || s.outOfRange > 0)
+    lines.push_back(fmt::format("inputs of combiners: {} negative variances count as 0, {} values were limited",
+                                s.negativeVariance, s.outOfRange));
+  for (const PipelineOutput& out : result.outputs) {
+    if (!out.ran() && asked) lines.push_back(fmt::format("{} did not run: {}", out.step.name, out.step.skipReason));
+    if (!out.step.note.empty()) lines.push_back(fmt::format("{} {}", out.step.name, out.step.note));
+  }
+  return lines;
+}
+
+}  // namespace braid

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/options/option_texts.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+
+#include <fmt/format.h>
+
+#include "renderer/core/error.h"
+
+namespace braid {
+
+namespace {
+
+constexpr double kLongestDuration = 1e9;  // seconds: 31 years
+constexpr int kMostPixelsASide = 65536;
+
+[[noreturn]] void refuseText(const std::string& text, const std::string& expected) {
+  throw Error(ExitCode::Usage, fmt::format("'{}': expected {}", text, expected));
+}
+
+// Numbers with the separators between them and nothing else; false otherwise.
+template <class T>
+bool readNumbers(const std::string& text, const std::string& separators, std::vector<T>& numbers) {
+  const char *at = text.data(), *end = at + text.size();
+  for (size_t i = 0;; ++i) {
+    T value{};
+    const auto [next, error] = std::from_chars(at, end, value);
+    if (error != std::errc()) return false;
+    numbers.push_back(value);
+    if (i == separators.size()) return next == end;
+    if (next == end || *next != separators[i]) return false;
+    at = next + 1;
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> splitList(const std::string& text) {
+  std::vector<std::string> list;
+  size_t begin = 0;
+  while (begin <= text.size()) {
+    const size_t end = std::min(text.find(',', begin), text.size());
+    if (end > begin) list.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return list;
+}
+
+double parseDuration(const std::string& text) {
+  double total = 0;
+  const char *at = text.data(), *end = at + text.size();
+  bool valid = at < end;
+  while (valid && at < end) {
+    double value = 0;
+    const auto [next, error] = std::from_chars(at, end, value);
+    valid = error == std::errc() && std::isfinite(value) && value >= 0;
+    const char unit = next < end ? *next : 's';
+    total += value * (unit == 'h' ? 3600 : unit == 'm' ? 60 : 1);
+    at = next < end && (unit == 'h' || unit == 'm' || unit == 's') ? next + 1 : next;
+  }
+  if (!valid || !(total <= kLongestDuration))
+    refuseText(text, "a duration such as 90, 90s, 2m, 1h or 1h30m, of at most 1e9 seconds");
+  return total;
+}
+
+std::vector<double> parseNumbers(const std::string& text, size_t count, double least, double most) {
+  std::vector<double> numbers;
+  bool valid = readNumbers(text, std::string(count - 1, ','), numbers);
+  for (const double n : numbers) valid = valid && n >= least && n <= most;
+  if (!valid) refuseText(text, fmt::format("{} numbers from {:g} to {:g}, separated by commas", count, least, most));
+  return numbers;
+}
+
+std::pair<int, int> parseSize(const std::string& text) {
+  std::vector<int> size;
+  const bool valid = readNumbers(text, "x", size) && size[0] > 0 && size[1] > 0 && size[0] <= kMostPixelsASide &&
+                     size[1] <= kMostPixelsASide && int64_t(size[0]) * size[1] <= (int64_t(1) << 28);
+  if (!valid)
+    refuseText(text, "WIDTHxHEIGHT such as 1280x720, from 1 to 65536 pixels a side and at most 268435456 in all");
+  return {size[0], size[1]};
+}
+
+PixelWindow parseWindow(const std::string& text) {
+  std::vector<int> n;
+  const bool valid = readNumbers(text, ",,,", n) && n[0] >= 0 && n[1] >= 0 && n[0] < n[2] && n[1] < n[3] &&
+                     n[2] <= kMostPixelsASide && n[3] <= kMostPixelsASide;
+  if (!valid)
+    refuseText(text, "x0,y0,x1,y1: 4 numbers from 0 to 65536, the window's ends (excluded) above its beginnings");
+  return {n[0], n[1], n[2], n[3]};
+}
+
+std::pair<int, int> parsePixel(const std::string& text) {
+  std::vector<int> n;
+  const bool valid =
+      readNumbers(text, ",", n) && n[0] >= 0 && n[1] >= 0 && n[0] < kMostPixelsASide && n[1] < kMostPixelsASide;
+  if (!valid) refuseText(text, "X,Y from 0,0 to 65535,65535");
+  return {n[0], n[1]};
+}
+
+PassInterval parsePasses(const std::string& text) {
+  std::vector<uint64_t> n;
+  if (!readNumbers(text, ":", n) || n[0] >= n[1] || n[1] > kMaxPass)
+    refuseText(text, fmt::format("FIRST:END such as 0:256, passes from 0 to {}, END excluded", kMaxPass));
+  return {n[0], n[1]};
+}
+
+}  // namespace braid

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/options/output_options.h"
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <unistd.h>
+
+#include <fmt/format.h>
+
+#include "renderer/core/error.h"
+#include "renderer/film/files/output_file.h"
+
+namespace braid {
+
+AovSet parseAovs(const std::string& name) {
+  if (name == "none") return AovSet::None;
+  if (name == "features") return AovSet::Features;
+  if (name == "all") return AovSet::All;
+  throw Error(ExitCode::Usage, "unknown --aovs '" + name + "': known are none, features, all");
+}
+
+const char* nameOf(AovSet set) { return set == AovSet::None ? "none" : set == AovSet::Features ? "features" : "all"; }
+
+void checkWritable(const std::string& path) {
+  if (isStream(path)) return;
+  const std::filesystem::path folder = std::filesystem::path(behindLinks(path)).parent_path();
+  const std::string name = folder.empty() ? "." : folder.string();
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(name, ignored))
+    throw Error(ExitCode::OutputFailed,
+                fmt::format("{}: the folder {} does not exist: create it or choose another output", path, name));
+  if (access(name.c_str(), W_OK) != 0)
+    throw Error(ExitCode::OutputFailed,
+                fmt::format("{}: the folder {} is not writable: {}", path, name, std::strerror(errno)));
+  if (std::filesystem::is_directory(path, ignored))
+    throw Error(ExitCode::OutputFailed, fmt::format("{}: is a folder: give a file name", path));
+}
+
+void prepareOutput(const std::string& path) {
+  checkWritable(path);
+  removeAbandoned(path);
+}
+
+}  // namespace braid

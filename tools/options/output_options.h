@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the subcommands that write images share.
+#pragma once
+
+#include <string>
+
+#include "renderer/film/files/exr.h"
+
+namespace braid {
+
+// none, features or all. Throws Error(Usage).
+AovSet parseAovs(const std::string& name);
+const char* nameOf(AovSet set);
+
+// Finds out before hours of rendering that the result could not be saved. Throws Error(OutputFailed).
+void checkWritable(const std::string& path);
+
+// The same; and temporary files that killed runs left of it go.
+void prepareOutput(const std::string& path);
+
+}  // namespace braid

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/preview/preview_feed.h"
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include "renderer/core/parallel.h"
+#include "renderer/core/stopwatch.h"
+
+namespace braid {
+
+namespace {
+
+uint64_t samplesOf(const Estimates& e) { return e.estimates.front().passes; }
+
+}  // namespace
+
+PreviewFeed::PreviewFeed(CombineChoice combine, const Session& session, int threads, Show show, Warn warn)
+    : choice_(std::move(combine)),
+      combines_(!choice_.wanted().empty()),
+      session_(session),
+      show_(std::move(show)),
+      warn_(std::move(warn)) {
+  helpers_ = std::max(1, (threads > 0 ? threads : machineThreads()) / 4);
+}
+
+PreviewFeed::~PreviewFeed() {
+  cancel_ = true;
+  noisyJob_.wait();
+  combineJob_.wait();
+}
+
+void PreviewFeed::collect(BackgroundJob& job) {
+  std::exception_ptr failure;
+  if (!job.collect(failure) || !failure) return;
+  try {
+    std::rethrow_exception(failure);
+  } catch (const std::exception& e) {
+    if (told_.insert(e.what()).second) warn_(e.what());
+  }
+}
+
+void PreviewFeed::round(const Progress& p) {
+  collect(noisyJob_);
+  collect(combineJob_);
+  if (p.seconds < nextNoisy_ || !noisyJob_.idle()) return;
+  const Stopwatch clock;
+  const Snapshot snapshot = session_.snapshot();
+  nextNoisy_ = p.seconds + std::max(kInterval, clock.seconds() / kHeldUpShare);
+  showNoisy(snapshot, p.seconds);
+  const double pause = combineTook_ / kCombiningShare;
+  // With one sample there is nothing yet that a method could tell noise from.
+  if (combines_ && samplesOf(*snapshot) >= 2 && combineJob_.idle() &&
+      (combineBegan_ < 0 || p.seconds >= combineBegan_ + pause))
+    combine(snapshot, p.seconds);
+}
+
+void PreviewFeed::showNoisy(const Snapshot& snapshot, double seconds) {
+  noisyJob_.start([this, snapshot, seconds] {
+    showImages(*snapshot, {}, {}, [&](const ImageViews& v) { show_(samplesOf(*snapshot), seconds, v); });
+  });
+}
+
+void PreviewFeed::combine(const Snapshot& snapshot, double seconds) {
+  combineBegan_ = seconds;
+  combineJob_.start([this, snapshot, seconds] {
+    const Stopwatch clock;
+    const PipelineResult result = runCombining(*snapshot, choice_, choice_.options(&cancel_), helpers_);
+    combineTook_ = clock.seconds();
+    if (cancel_) return;
+    showImages(*snapshot, result, choice_.wanted(), [&](ImageViews v) {
+      // By now there are newer noisy ones.
+      v.noisy = nullptr;
+      v.noisyError = nullptr;
+      show_(samplesOf(*snapshot), seconds, v);
+    });
+  });
+}
+
+}  // namespace braid

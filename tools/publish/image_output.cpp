@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/publish/image_output.h"
+
+#include <cmath>
+#include <exception>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "renderer/core/error.h"
+#include "renderer/core/parallel.h"
+#include "renderer/core/stopwatch.h"
+#include "renderer/film/error_map.h"
+#include "renderer/film/files/output_file.h"
+#include "renderer/film/files/picture.h"
+#include "tools/publish/exr_metadata.h"
+#include "tools/options/option_checks.h"
+#include "tools/options/output_options.h"
+#include "tools/run/progress_line.h"
+#include "tools/publish/estimated_error.h"
+
+namespace braid {
+
+namespace {
+
+// The last wanted method that ran; null: none.
+const MethodResult* headlineOf(const PipelineResult& combined, const std::vector<std::string>& wanted) {
+  for (size_t i = wanted.size(); i > 0; --i)
+    if (const PipelineOutput* out = combined.find(wanted[i - 1]); out && out->ran()) return &out->result;
+  return nullptr;
+}
+
+// What of the light no integrator could find; empty: none of it.
+std::string lightOutOfReach(const Estimates& estimates) {
+  for (const Attribute& a : estimates.attributes)
+    if (a.name == kUnreachableAttribute) return a.text;
+  return "";
+}
+
+// The error of the last wanted method that ran, or of the first integrator; none where light is missing, which leaves
+// no trace in the samples.
+std::optional<double> headlineError(const PipelineResult& combined, const std::vector<std::string>& wanted,
+                                    const Estimates& estimates) {
+  if (!lightOutOfReach(estimates).empty()) return std::nullopt;
+  if (const MethodResult* result = headlineOf(combined, wanted)) {
+    if (result->error.empty()) return std::nullopt;
+    return relativeError(result->error, squaredLevels(result->image.mean));
+  }
+  const Estimate& first = estimates.estimates.front();
+  if (!knowsError(first)) return std::nullopt;
+  return relativeError(errorMap(first), squaredLevels(first));
+}
+
+// Both tasks run, beside each other; then throws what the first of them threw.
+void bothWhateverFails(const std::function<void()>& one, const std::function<void()>& other) {
+  std::exception_ptr failures[2];
+  const auto caught = [](const std::function<void()>& task, std::exception_ptr& failure) {
+    try {
+      task();
+    } catch (...) {
+      failure = std::current_exception();
+    }
+  };
+  parallelBoth([&] { caught(one, failures[0]); }, [&] { caught(other, failures[1]); });
+  for (const std::exception_ptr& failure : failures)
+    if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace
+
+std::vector<std::string> ImageOutput::files() const {
+  std::vector<std::string> list;
+  for (const std::string& name : {file, png})
+    if (!name.empty()) list.push_back(name);
+  return list;
+}
+
+AovSet ImageOutput::aovSet() const {
+  if (!aovs.empty()) return parseAovs(aovs);
+  const bool more = quarters || history || directIndirect || combine.weights || !combine.denoisers.empty();
+  return more ? AovSet::All : AovSet::Features;
+}
+
+ImageOutput ImageOutput::replaceable() const {
+  ImageOutput output = *this;
+  for (std::string* name : {&output.file, &output.png})
+    if (isStream(*name)) name->clear();
+  return output;
+}
+
+ImageOutput ImageOutput::plain() const {
+  ImageOutput output = *this;
+  output.combine.combine = "none";
+  output.combine.denoisers.clear();
+  return output;
+}
+
+void checkImageFiles(const ImageOutput& output) {
+  if (!output.file.empty()) imageFormat(output.file);
+  if (!output.png.empty() && !isStream(output.png) && imageFormat(output.png) != ImageFormat::Png)
+    throw Error(ExitCode::Usage,
+                fmt::format("--png {}: writes PNG: name a file that ends in .png, or use -o", output.png));
+  for (const std::string& file : output.files()) prepareOutput(file);
+}
+
+std::string writeImageFile(const std::string& path, const Estimates& estimates, const Rgb<float>& image,
+                           const Plane<float>* alpha, const ExrOptions& exr, double exposureStops) {
+  const ImageFormat format = imageFormat(path);
+  if (format != ImageFormat::Exr) {
+    writePicture(path, format, image, alpha, static_cast<float>(exposureStops));
+    return "";
+  }
+  const WriteReport report = writeExr(path, estimates, image, alpha, exr);
+  if (report.clampedToHalf == 0) return "";
+  return fmt::format("{}: {} values above 65504 were clamped to fit half floats: use --float", path,
+                     report.clampedToHalf);
+}
+
+void addImageOptions(CLI::App& command, ImageOutput& o) {
+  command
+      .add_option("--combine", o.combine.combine,
+                  "none, or denoisers and combiners separated by commas (--list); the last one is the image R G B")
+      ->capture_default_str()
+      ->type_name("NAMES");
+  addCombineOptions(command, o.combine);
+  command
+      .add_option("-o,--output", o.file,
+                  "Image to write, by its ending: .exr with layers; .png, .jpg tone-mapped; .hdr, .tif linear; "
+                  "- is EXR to standard output")
+      ->type_name("FILE");
+  command.add_option("--png", o.png, "Also write a tone-mapped PNG")->type_name("FILE");
+  command.add_option("--exposure", o.exposure, "Exposure of PNG and JPEG in stops")
+      ->capture_default_str()
+      ->check(number(-64, 64));
+  command
+      .add_option(
+          "--aovs", o.aovs,
+          fmt::format("Layers of the EXR besides the image: none; features, with the image's error; or all, "
+                      "which combining the file later takes (default: {})",
+                      o.aovs.empty() ? "features; all with --quarters, --direct-indirect, --history, --weights or "
+                                       "--denoiser"
+                                     : o.aovs))
+      ->type_name("SET");
+  command.add_flag("--quarters", o.quarters, "Also write the four quarter buffers");
+  command.add_flag("--direct-indirect", o.directIndirect,
+                   "Also write direct light by itself and both parts' variances, for combining later");
+  command.add_flag("--history", o.history, "Also write the variances after 1, 2, 4, ... samples, for combining later");
+  command.add_flag("--float", o.floatHeadline, "32-bit floats for R G B and the features too");
+  command.add_option("--layer-prefix", o.layerPrefix, "Put before every layer's name, e.g. ViewLayer")
+      ->type_name("NAME");
+  command.add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
+}
+
+void showImages(const Estimates& estimates, const PipelineResult& combined, const std::vector<std::string>& wanted,
+                const ShowImages& show) {
+  const Estimate& first = estimates.estimates.front();
+  ImageViews views{&first.mean};
+  Plane<float> noisyError, noisyLevels, combinedLevels;
+  if (knowsError(first)) {
+    noisyError = errorMap(first);
+    noisyLevels = squaredLevels(first);
+    views.noisyError = &noisyError;
+    views.noisyLevels = &noisyLevels;
+  }
+  if (const MethodResult* result = headlineOf(combined, wanted)) {
+    views.combined = &result->image.mean;
+    if (!result->error.empty()) {
+      combinedLevels = squaredLevels(result->image.mean);
+      views.combinedError = &result->error;
+      views.combinedLevels = &combinedLevels;
+    }
+  }
+  show(views);
+}
+
+WrittenImage writeImage(const ImageOutput& o, Estimates& estimates, const Plane<float>* alpha, int threads,
+                        const std::atomic<bool>* cancel) {
+  WrittenImage written;
+  const std::vector<std::string> wanted = o.combine.wanted();
+  const Stopwatch combining;
+  const PipelineResult combined = runCombining(estimates, o.combine, o.combine.options(cancel), threads);
+  written.combineSeconds = combining.seconds();
+  if (cancel && cancel->load()) {
+    written.cancelled = true;
+    return written;
+  }
+  withThreads(threads, [&] {
+    if (o.show) showImages(estimates, combined, wanted, o.show);
+    const Stopwatch writing;
+    written.error = headlineError(combined, wanted, estimates);
+    if (written.error)
+      estimates.attributes.push_back({"braid/estimatedError", Attribute::Kind::Float, "", 0, *written.error, {}});
+    // CombinedLayers may move the estimates.
+    const Rgb<float> first = headlineOf(combined, wanted) ? Rgb<float>() : estimates.estimates.front().mean;
+    const CombinedLayers layers(combined, wanted, o.combine.weights, !o.noTiming, estimates);
+    const Rgb<float>& headline = layers.headline() ? *layers.headline() : first;
+    ExrOptions exr;
+    exr.layers = layers.layers();
+    exr.history = o.history;
+    exr.aovs = o.aovSet();
+    exr.quarters = o.quarters;
+    exr.directIndirect = o.directIndirect;
+    exr.floatHeadline = o.floatHeadline;
+    exr.layerPrefix = o.layerPrefix;
+    written.warnings = combineWarnings(combined, o.combine.asked);
+    if (const std::string missing = lightOutOfReach(estimates); !missing.empty())
+      written.warnings.push_back(missing + "; the error of this image is not known");
+    // Beside each other: a PNG is compressed by one thread.
+    std::string warning;
+    bothWhateverFails(
+        [&] {
+          if (!o.file.empty()) warning = writeImageFile(o.file, estimates, headline, alpha, exr, o.exposure);
+        },
+        [&] {
+          if (!o.png.empty()) writePicture(o.png, ImageFormat::Png, headline, alpha, static_cast<float>(o.exposure));
+        });
+    if (!warning.empty()) written.warnings.push_back(std::move(warning));
+    written.writeSeconds = writing.seconds();
+  });
+  for (const PipelineOutput& out : combined.outputs)
+    if (out.ran())
+      written.timings.push_back(fmt::format("{} in {}, its inputs in {}; its mean is {:.2f} % of that of {}",
+                                            out.step.name, formatSeconds(out.seconds), formatSeconds(out.inputSeconds),
+                                            100 * out.meanOverUnbiased, out.step.unbiased));
+  return written;
+}
+
+}  // namespace braid

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/publish/scene_identity.h"
+
+#include <fmt/format.h>
+
+#include "renderer/core/hash.h"
+
+namespace braid {
+
+namespace {
+
+std::string environmentHash(const SceneChoice& c, const SceneData& data) {
+  if (c.environment.empty() || !data.environment || !data.environment->image) return "none";
+  const Image& image = *data.environment->image;
+  ContentHash hash;
+  if (!image.bytes.empty()) hash.add(image.bytes.data(), image.bytes.size());
+  if (!image.floats.empty()) hash.add(image.floats.data(), image.floats.size() * sizeof(float));
+  return fmt::format("{}x{}:{}", image.width, image.height, hexString(hash.value()));
+}
+
+const char* yesOrNo(bool yes) { return yes ? "on" : "off"; }
+
+}  // namespace
+
+std::vector<StateOption> sceneIdentity(const SceneChoice& c, const SceneData& data) {
+  return {{"--env", environmentHash(c, data)},
+          {"--env-rotate", fmt::format("{}", c.environmentRotation)},
+          {"--env-scale", fmt::format("{}", c.environmentScale)},
+          {"--light-scale", fmt::format("{}", c.lightScale)},
+          {"--scene", std::to_string(c.frameScene)},
+          {"--variant", c.load.variant},
+          {"--frame-time", fmt::format("{}", c.frameTime)},
+          {"--animation", c.load.animation},
+          {"--double-sided", yesOrNo(c.load.doubleSided)},
+          {"--no-default-light", yesOrNo(c.noDefaultLight)},
+          {"the default light", yesOrNo(data.defaultLight)}};
+}
+
+}  // namespace braid

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/sweep/sweep_record.h"
+
+#include <cmath>
+#include <fstream>
+#include <thread>
+
+#include <fmt/format.h>
+#include <sys/utsname.h>
+#include <unistd.h>
+
+#include "renderer/core/error.h"
+#include "renderer/core/hash.h"
+
+namespace braid {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string processorName() {
+  std::ifstream info("/proc/cpuinfo");
+  std::string line;
+  while (std::getline(info, line))
+    if (line.rfind("model name", 0) == 0) {
+      const size_t colon = line.find(": ");
+      return colon == std::string::npos ? "" : line.substr(colon + 2);
+    }
+  return "unknown";
+}
+
+[[noreturn]] void refuse(const std::string& path, const std::string& what, const Json& before, const Json& now) {
+  throw Error(ExitCode::Usage,
+              fmt::format("{}: the sweep in this folder was made with {} {}, not {}: its rows cannot be compared with "
+                          "new ones; give the same options or another folder (-o)",
+                          path, what, before.dump(), now.dump()));
+}
+
+Json finiteOrNull(double v) { return std::isfinite(v) ? Json(v) : Json(); }
+
+}  // namespace
+
+Json sweepSettings(const SweepOptions& options, const Settings& settings, const Measurement& measurement) {
+  Json metrics = Json::array();
+  for (const Metric* m : measurement.metrics) metrics.push_back(m->name);
+  return {{"size", fmt::format("{}x{}", settings.width, settings.height)},
+          {"maxDepth", settings.maxDepth},
+          {"sampler", options.sampler},
+          {"threads", options.threads},
+          {"isa", options.isa},
+          {"cropWorst", options.cropWorst},
+          {"metrics", metrics}};
+}
+
+Json machineRecord() {
+  utsname system{};
+  uname(&system);
+  const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE)) /
+                        (1024.0 * 1024 * 1024);
+  return {{"processor", processorName()},
+          {"threads", std::thread::hardware_concurrency()},
+          {"memoryGiB", std::round(10 * memory) / 10},
+          {"system", fmt::format("{} {} {}", system.sysname, system.release, system.machine)}};
+}
+
+Json sceneRecord(const SweepScene& scene, const ReferenceFrame& frame) {
+  const SweepReference& r = scene.reference;
+  Json reference = {{"file", r.file},
+                    {"integrator", r.integrator},
+                    {"spp", r.spp},
+                    {"seconds", r.seconds},
+                    {"hash", hexString(r.contentHash)},
+                    {"relL2OfItsNoise", finiteOrNull(referenceNoise(r.image))}};
+  return {{"name", scene.name},
+          {"file", scene.file},
+          {"hash", hexString(frame.sceneHash)},
+          {"frame", referenceName(frame)},
+          {"planned", scene.planned},
+          {"seconds",
+           {{"load", scene.loadSeconds},
+            {"prepare", scene.scene->buildTimes().prepare},
+            {"hierarchy", scene.scene->buildTimes().hierarchy}}},
+          {"reference", reference}};
+}
+
+Json readRecord(const std::string& path) {
+  std::ifstream in(path);
+  Json record = Json::parse(in, nullptr, false);
+  if (!in || !record.is_object() || !record.contains("settings") || !record.contains("scenes"))
+    throw Error(ExitCode::Usage, fmt::format("{}: is missing or damaged, so the rows beside it cannot be added to: "
+                                             "choose another folder (-o) or delete the old sweep.csv",
+                                             path));
+  return record;
+}
+
+void requireSameSettings(const std::string& path, const Json& before, const Json& now) {
+  for (const auto& [name, value] : now.items()) {
+    const Json old = before.contains(name) ? before[name] : Json();
+    if (old != value) refuse(path, name, old, value);
+  }
+}
+
+void requireSameScene(const std::string& path, const Json& before, const Json& now) {
+  const std::string name = now["name"];
+  if (before["frame"] != now["frame"])
+    refuse(path, "another file or camera of the scene " + name + ":", before["frame"], now["frame"]);
+  if (before["reference"]["hash"] != now["reference"]["hash"])
+    refuse(path, "another reference of the scene " + name + ":", before["reference"], now["reference"]);
+}
+
+}  // namespace braid
