@@ -1,17 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Path tracing with common random numbers: in one pass all pixels use the same variate in every structural dimension,
-// the position within the pixel and stochastic coverage included. The error of a pass is then nearly the same in
-// neighbouring pixels and cancels in their differences, which is what uncorrelated weighting feeds on (Back et al.
-// 2023, "Input-Dependent Uncorrelated Weighting for Monte Carlo Denoising", section 3).
+// the position within the pixel and stochastic coverage included (integrators/README.md, Common random numbers).
 //
-// Passes are independent whatever sampler the settings ask for. The film corrects the variance of low-discrepancy
-// passes by the spread of the bucket means over a window of pixels; here all pixels of that window have one and the
-// same error, so that two buckets would leave a single degree of freedom. Over independent passes the variance of each
-// pixel is true by itself, and sub-averages are identically distributed, as the weights assume (theorem 2).
-//
-// Russian roulette with a shared variate would end whole regions of paths along a line of equal throughput: an edge
-// that is not in the scene. It therefore starts late and keeps paths at half of the throughput that the path tracer
-// keeps them at: so large is the step at such an edge, and so much less is the error that all pixels share.
+// Passes are independent whatever sampler the settings ask for: the film corrects the variance of low-discrepancy
+// passes over a window of pixels, which all have one and the same error here. Russian roulette with a shared variate
+// ends whole regions of paths along an edge that is not in the scene; it therefore starts late and keeps paths longer.
 #include "integrators/path_kernel.h"
 #include "integrators/registry.h"
 #include "integrators/tiles.h"

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vertex connection and merging (Georgiev, Křivánek, Davidovič and Slusallek 2012, "Light Transport Simulation with
-// Vertex Connection and Merging"): bidirectional path tracing that also merges eye vertices with the light vertices of
-// the whole pass that lie near them, all weighted together. Consistent, not unbiased: the merging radius shrinks with
-// the pass, r = r₁ k^(-(1-α)/2) with α = 0.75 and k counting rounds of four passes, so that all buckets have the same
-// radii.
+// Vertex connection and merging: bidirectional path tracing that also merges eye vertices with the light vertices of
+// the whole pass that lie near them (integrators/README.md, Vertex connection and merging). Consistent, not unbiased.
 //
 // A pass traces its light subpaths twice, once for the grid and once, with the same random numbers, beside the eye
 // subpath that connects to them: full vertices of a whole frame would take ten times the memory.
@@ -21,7 +18,7 @@ namespace braid {
 namespace {
 
 constexpr uint64_t kEyeStream = 0x76636d0, kLightStream = 0x76636d1;
-constexpr double kAlpha = 0.75;
+constexpr double kAlpha = 0.75;  // radii shrink by k^(-(1-α)/2), k counting rounds of four passes
 constexpr size_t kChunk = 4096;  // light subpaths
 
 struct MergePreparation final : LightPreparation {

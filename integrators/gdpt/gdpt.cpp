@@ -1,18 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Gradient-domain path tracing: every pass estimates the image and its differences between neighbouring pixels, and a
-// screened Poisson equation (gdpt_poisson.h, α = 0.2, L2 norm) finds the image that fits both (Lehtinen et al. 2013;
-// Kettunen et al. 2015). Differences of correlated paths have little noise where the image is smooth, so that the error
-// left is one of low frequency only. The shift mapping is described in gdpt_kernel.h.
+// screened Poisson equation finds the image that fits both (integrators/README.md, Gradient-domain path tracing).
 //
-// Each pass is reconstructed by itself. The solution is linear in what was sampled, hence unbiased, and the mean of
-// reconstructed passes is the reconstruction of the mean: halves, quarters and variances come out as for any other
-// integrator. A pass may be negative.
+// Each pass is reconstructed by itself. The solution is linear in what was sampled, so halves, quarters and variances
+// come out as for any other integrator. A pass may be negative.
 //
-// What the camera sees directly (emission, background, unlit surfaces) has no noise worth reconstructing and sharp
-// edges: it is kept out and added afterwards. Pixels in which a few rays ahead of the render met the background only
-// keep their path-traced value, which is exact there; the choice is made once and does not depend on any pass, so it
-// biases nothing. Differences are taken inside of the plan's window only: a crop is not that region of the full frame
-// to the bit.
+// What the camera sees directly is kept out of the equation, and pixels in which a few rays ahead of the render met the
+// background only keep their path-traced value: that choice does not depend on any pass, so it biases nothing.
 #include "integrators/gdpt/gdpt_kernel.h"
 #include "integrators/gdpt/gdpt_poisson.h"
 #include "integrators/registry.h"

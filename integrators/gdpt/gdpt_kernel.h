@@ -1,26 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Traces a base path and its shifts to the four neighbouring pixels (Kettunen et al. 2015, "Gradient-Domain Path
-// Tracing"), with the hybrid of random replay and reconnection of Lin et al. 2022 ("Generalized Resampled Importance
-// Sampling", section 7) as the shift mapping:
+// Traces a base path and its shifts to the four neighbouring pixels. A shifted path replays the random numbers of the
+// base path until both can reconnect (integrators/README.md, Gradient-domain path tracing).
 //
-//   - replay: the shifted path starts in the neighbour at the same position within the pixel and uses the same random
-//     numbers, dimension by dimension. In the space of random numbers that is the identity: Jacobian 1, whatever the
-//     path goes through (mirrors, glass, coverage, nested solids). It replaces copying half vectors, whose Jacobian
-//     and failure cases differ from lobe to lobe.
-//   - reconnection: at the first two consecutive vertices of the base path that are both rough, the shifted path turns
-//     to the base path's vertex and follows it from there. Its Jacobian in the space of random numbers is the ratio
-//     of the densities per area with which the two paths would sample the two shared vertices that depend on where
-//     the path came from.
-//
-// Each contribution (light sampled at a vertex; light found by the ray to a vertex) is shifted on its own. With f_x(u)
-// the estimate of pixel x from random numbers u, T: u → u' the shift to pixel y and J = |∂u'/∂u|, a sample at x adds
-//
-//   w (f_y(u') J - f_x(u)),   w = 1 / (1 + J),
-//
-// to the difference of the pixels. The sample at y shifts back with 1/J and has the weight J / (1 + J), so together
-// they count every pair once (balance heuristic between the two directions). Where the shift does not exist it does
-// not exist from the other side either, and f_x counts with weight 1. For that the rule when to reconnect must give the
-// same answer from both sides: the shift fails where the shifted path alone could reconnect.
+// Each contribution (light sampled at a vertex; light found by the ray to a vertex) is shifted on its own. TRAP: the
+// rule when to reconnect must give the same answer from both sides: the shift fails where the shifted path alone could
+// reconnect.
 //
 // A pane that a path passes is no vertex to its MIS weights and its length, but it is one to the shift mapping: base
 // path and shifts pass or meet surfaces in step, and never reconnect through a pane.

@@ -1,13 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Alternating directions (Peaceman and Rachford 1955). On a rectangle the operator splits into H + V with
-// H = α²/2 + differences along rows and V = α²/2 + those along columns, which commute and have their eigenvalues in
-// [α²/2, α²/2 + 4]. A step with parameter p solves
+// Alternating directions (integrators/README.md, Alternating directions): a step with parameter p solves
 //
-//   (H + p) u½ = b - (V - p) u,   (V + p) u' = b - (H - p) u½,
-//
-// which shrinks the error of each pair of eigenvalues by (λ-p)(μ-p)/((λ+p)(μ+p)). With Wachspress's optimal parameters
-// for that interval and α = 0.2, 16 steps leave less than 10⁻⁸ whatever the size of the image: linear time, no Fourier
-// transforms, no trouble with prime widths.
+//   (H + p) u½ = b - (V - p) u,   (V + p) u' = b - (H - p) u½.
 //
 // Both halves have the form r ← b - r + s T⁻¹ r with T = H + p or V + p, r the right-hand side of the next half: in the
 // first, r = b - (V - p) u, so that b - (H - p) u½ = b - (H + p) u½ + 2p u½ = b - r + 2p u½; likewise in the second

@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Screened Poisson reconstruction: the image that has given gradients as nearly as it can and does not stray from a
-// given image,
-//
-//   minimise  Σ α² (I - P)² + Σ (I(right) - I - Gx)² + Σ (I(below) - I - Gy)²,   no gradients across the border,
-//
-// i.e. (α² + L) I = α² P - div G with the graph Laplacian L of the pixel grid (Lehtinen et al. 2013, "Gradient-Domain
-// Metropolis Light Transport", section 4.1).
+// given image (integrators/README.md, Gradient-domain path tracing).
 #pragma once
 
 #include "renderer/core/plane.h"

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stochastic progressive photon mapping (Hachisuka and Jensen 2009) with the radii of Knaus and Zwicker 2011, which
-// depend on the pass alone: each pass is an independent estimate with its own radius, and the mean over passes equals
-// the classic recursion. Passes estimate their bias by comparing two radii (ALGORITHMS 6.2). What is gathered where:
-// sppm_eye.h.
+// Stochastic progressive photon mapping with radii that depend on the pass alone: each pass is an independent estimate
+// with its own radius, and the mean over passes equals the classic recursion (integrators/README.md, Photon mapping).
+// Passes estimate their bias by comparing two radii (integrators/README.md, Bias of photon maps).
 #include <fmt/format.h>
 
 #include "integrators/light_preparation.h"

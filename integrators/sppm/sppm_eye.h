@@ -1,18 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The eye half of a photon mapping pass. From the camera a path follows narrow lobes until it picks a broad one; there
-// photons are gathered (ALGORITHMS 6.1). Which estimator finds which light:
-//
-//   - the camera, or only delta scattering and null interfaces before the light: the eye path hits the light, weight 1;
-//   - the last eye vertex scatters by a narrow lobe: next-event estimation and hitting the light, power heuristic, both
-//     of the narrow lobes' value; the choice of the group is part of the density of hitting;
-//   - it scatters by a narrow lobe, and nothing but delta scattering lies before the light: hitting the light, and
-//     photons of such light, power heuristic (CausticMerging; without it hitting the light alone);
-//   - it scatters by a broad lobe, and the light is one segment away: the same of the broad lobes' value; the ray that
-//     looks for the light ends at what it hits. With `photonDirect`: photons of one segment instead;
-//   - it scatters by a broad lobe and the light is further away: photons of two and more segments.
-//
-// An eye path never continues beyond a broad vertex and no other photons are gathered at narrow lobes, so every path of
-// light belongs to exactly one of these: it is split at its first broad scattering event as seen from the camera.
+// photons are gathered. An eye path never continues beyond a broad vertex, except to see whether it hits a light, and
+// no photons but those of caustics are gathered at narrow lobes. Every path of light therefore belongs to exactly one
+// estimator (integrators/README.md, Photon mapping).
 #pragma once
 
 #include <array>

@@ -57,7 +57,8 @@ RadiusScale gatherRadii(const Plan& plan, const SceneTraits& traits, uint64_t pa
 GatheredLight gatheredLight(const PhotonSum& sum, double lightPaths, float radius) {
   const double area = static_cast<double>(kPi) * sqr(static_cast<double>(radius));
   const auto scale = static_cast<float>(1 / (lightPaths * area));
-  // The bias of a constant kernel grows with its area, so the excess over the inner disc is this share of it.
+  // The bias of a constant kernel grows with its area, so the excess over the inner disc is this share of it
+  // (integrators/README.md, Bias of photon maps).
   const Spectrum all = sum.inner + sum.outer;
   return {all * scale, (all - sum.inner / kInnerArea) * (scale / (1 - kInnerArea))};
 }

@@ -9,19 +9,17 @@
 
 namespace braid {
 
-// The factor of a pass' radii, of the first ones': r_i = r_1 i^(-(1 - alpha)/2) with alpha = 2/3 (Georgiev et al. 2012;
-// Knaus and Zwicker 2011), i = pass / 4 + 1: the four buckets of the film see the same radii, so that both halves have
-// the same bias. Variance and squared bias of the mean then both fall as passes^(-2/3).
+// The factor of a pass' radii, of the first ones': i^(-(1 - alpha)/2) with alpha = 2/3, i = pass / 4 + 1, so that the
+// four buckets of the film see the same radii and both halves have the same bias (integrators/README.md, Photon
+// mapping).
 float radiusShrinkage(uint64_t pass);
 
 // Gather radii of a pass: Settings::photonRadius pixels as seen over the path from the camera, between 1e-7 and 0.05 of
 // the scene's radius, times radiusShrinkage().
 RadiusScale gatherRadii(const Plan& plan, const SceneTraits& traits, uint64_t pass);
 
-// The share of the disc's area that lies in its inner disc, of half the radius. Where a straight edge of light crosses
-// the disc, which is where most bias of caustics is, the mean square of the bias estimate is 0.41 of the true one, and
-// 0.30 with an inner disc of half the area; smaller ones say still more, but are noisier (0.57 at 0.3 of the radius, at
-// 2.3 times the variance). The bias of curved irradiance is told in full by any.
+// The share of the disc's area that lies in its inner disc: smaller ones estimate more of the bias at edges of light,
+// but are noisier (integrators/README.md, Bias of photon maps).
 inline constexpr float kInnerArea = 0.25f;
 
 // Sums of f · |cos| · power / |geometric cos| over photons, by their distance.

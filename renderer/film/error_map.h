@@ -7,9 +7,8 @@
 namespace braid {
 
 // The squared bias of the mean, per pixel and channel average: max(0, F(B² - Var B)), F the average over 13 x 13 pixels
-// (ALGORITHMS 6.2). B² - Var B is an unbiased estimate of the square, and squares are averaged rather than biases
-// because these change their sign from pixel to pixel along edges: max(0, F(B)² - F(Var B)) found a twentieth of the
-// squared bias of a caustic. Zero for estimates without a bias plane.
+// (integrators/README.md, Bias of photon maps). Squares are averaged rather than biases, because these change their
+// sign from pixel to pixel along edges. Zero for estimates without a bias plane.
 Plane<float> squaredBias(const Estimate& estimate);
 
 // Whether there are passes and a variance to tell an error by.

@@ -21,7 +21,8 @@ struct PixelWindow {
   bool operator==(const PixelWindow&) const = default;
 };
 
-// Features of the first non-specular vertex of a camera path (ALGORITHMS 0): 8 components, planes in this order.
+// Features of the first non-specular vertex of a camera path (renderer/README.md, Features): 8 components, planes in
+// this order.
 struct FeatureSample {
   Spectrum albedo{0};
   Vec3 normal{0};
@@ -119,8 +120,7 @@ class Accumulator {
   // passes of a bucket share a low-discrepancy sequence.
   Rgb<float> passVariance() const;
   // The calibrated variance of the mean. `lowDiscrepancy` false: passVariance(). True: passVariance() rescaled by the
-  // ratio of 9x9 box averages of the variance between buckets (independent scrambles) to passVariance()
-  // (ALGORITHMS 4.6 step 1); buckets of unequal counts are weighted.
+  // variance between buckets, which have independent scrambles (renderer/README.md, Calibrated variance).
   Rgb<float> variance(bool lowDiscrepancy) const;
 
   // The mean estimate of the bias, those of the halves, and the variance of the mean; empty when bias is not kept.

@@ -16,8 +16,9 @@ struct ReferenceImage {
 
 // Relative squared error, mean over pixels and channels of (z - A)(z - B) / (mean_RGB(R)² + 0.01) with R the mean of
 // the halves A and B: for z independent of both, E (z - A)(z - B) = E (z - truth)², so the reference's own noise adds
-// nothing on average (ALGORITHMS-BEYOND 8.1). May be negative where the noise of the reference exceeds the error.
-// Pixels with a non-finite reference are left out; infinite when the image is not finite; NaN without halves.
+// nothing on average (tools/README.md, Errors against a noisy reference). May be negative where the noise of the
+// reference exceeds the error. Pixels with a non-finite reference are left out; infinite when the image is not finite;
+// NaN without halves.
 double relL2Unbiased(const Rgb<float>& image, const ReferenceImage& reference);
 
 // Mean over pixels and channels of squared bias / (mean_RGB(R)² + 0.01): with e_k the errors of N >= 2 independent

@@ -120,7 +120,8 @@ std::vector<std::vector<double>> casesOf(const SweepTable& table, const SweepSum
   return values;
 }
 
-// Score-and-sort (ALGORITHMS 4.7): in every case the best of n methods scores n, the worst 1; equal errors share.
+// Score and sort (tools/README.md, Score and sort): in every case the best of n methods scores n, the worst 1; equal
+// errors share.
 void rank(const std::vector<std::vector<double>>& cases, SweepSummary& summary) {
   for (const std::vector<double>& errors : cases)
     for (size_t i = 0; i < errors.size(); ++i)
