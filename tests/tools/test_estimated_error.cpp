@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The relative error that a render tells of itself, on images whose true one is known.
+// The estimated relative error of a render, on images whose true one is known.
 #include <cmath>
 #include <limits>
 #include <random>

@@ -131,7 +131,7 @@ TEST_CASE("Claims hold or not by their cells, and say when nothing was measured"
   REQUIRE(gain);
   CHECK(gain->measured.find("4x less error over 1 scenes") == 0);
   CHECK(gain->holds == true);
-  const PaperClaim* error = findClaim(sections, "error that it tells of itself");
+  const PaperClaim* error = findClaim(sections, "Its estimated error");
   REQUIRE(error);
   CHECK(error->holds == true);
   CHECK(error->measured.find("3 of 3 runs") == 0);

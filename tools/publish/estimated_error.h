@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The relative error that a render tells of itself: relL2 of `braid compare`, as well as it can be known without the
+// The estimated relative error of a render: relL2 of `braid compare`, as well as it can be known without the
 // reference,
 //
 //   mean over pixels of  E / u,   u = T² + 0.01,

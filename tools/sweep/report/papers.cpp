@@ -255,7 +255,7 @@ PaperClaim Comparison::combiningShare() const {
 }
 
 PaperClaim Comparison::errorMapClaim() const {
-  PaperClaim result{"The error that it tells of itself is within a factor of two of the true one", "not measured", {}};
+  PaperClaim result{"Its estimated error is within a factor of two of the true one", "not measured", {}};
   const auto& columns = table_.columns;
   const auto index = [&](const char* name) {
     return static_cast<size_t>(std::find(columns.begin(), columns.end(), name) - columns.begin());
@@ -272,7 +272,7 @@ PaperClaim Comparison::errorMapClaim() const {
     sum += std::log(ratio);
   }
   if (cells == 0) return result;
-  result.measured = fmt::format("{} of {} runs from 16 spp; geometric mean of told/true {}", held, cells,
+  result.measured = fmt::format("{} of {} runs from 16 spp; geometric mean of estimated/true {}", held, cells,
                                 shortNumber(std::exp(sum / static_cast<double>(cells))));
   result.holds = held == cells;
   return result;
