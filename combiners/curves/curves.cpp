@@ -239,8 +239,8 @@ MethodResult Curves::run(const MethodInputs& in) const {
 }  // namespace
 
 uint64_t stopPasses(double number) {
-  constexpr double kFewest = 2, kMost = 1e12;
-  return number >= 1 ? static_cast<uint64_t>(std::clamp(number, kFewest, kMost)) : 0;
+  constexpr double kFewestPasses = 2, kMostPasses = 1e12;
+  return number >= 1 ? static_cast<uint64_t>(std::clamp(number, kFewestPasses, kMostPasses)) : 0;
 }
 
 std::unique_ptr<Method> make_curves() { return std::make_unique<Curves>(); }

@@ -11,9 +11,9 @@ namespace braid {
 
 namespace {
 
-constexpr int kPaths = 4096;
-constexpr uint64_t kSeed = 0x6c6974;
-constexpr int kMaxSegments = 12;
+constexpr int kCameraPaths = 4096;
+constexpr uint64_t kLitSeed = 0x6c6974;
+constexpr int kLitSegments = 12;
 // From so much weight on, a share this large is no accident of where the first paths went.
 constexpr double kEnoughSeen = 128, kEnoughLit = 0.1;
 
@@ -103,15 +103,15 @@ class Glance {
 LitShare measureLitShare(const TransportContext& context, const Camera& camera, int width, int height,
                          double reference) {
   WalkSettings settings;
-  settings.maxSegments = kMaxSegments;
+  settings.maxSegments = kLitSegments;
   settings.roulette = {Roulette::kNever, 1};
   settings.mis = false;
-  const PassSampler sampler(SamplerKind::Independent, kSeed, 0, 0, 1);
+  const PassSampler sampler(SamplerKind::Independent, kLitSeed, 0, 0, 1);
   const MediaStack media = mediaOfCamera(context.scene, camera);
   const Vec2 frame(static_cast<float>(width), static_cast<float>(height));
   SubpathBatch batch(context, sampler, settings);
   LitShare lit;
-  for (int first = 0; first < kPaths; first += kBatch) {
+  for (int first = 0; first < kCameraPaths; first += kBatch) {
     batch.clear();
     for (int i = first; i < first + kBatch; ++i)
       batch.startCamera(sampler.itemKey(static_cast<uint64_t>(i)), camera.ray(framePoint(i) * frame), media, 1, 1,
