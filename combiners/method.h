@@ -83,7 +83,7 @@ struct MethodInputs {
   // Runs the denoiser that made `biased` on another colour image, everything else unchanged.
   std::function<Rgb<float>(const Rgb<float>&)> redenoise;
   // Runs it on half h (0 or 1) of its colour alone. Null: its halves share no weights anyway, or there are no quarters,
-  // which tell the noise of a half.
+  // which show the noise of a half.
   std::function<Rgb<float>(int h)> denoiseHalf;
   bool meanOnly = false;  // of the result only image.mean will be read
   uint64_t seed = 0;

@@ -10,14 +10,12 @@ namespace braid {
 
 namespace {
 
-// Where photons pay: where camera paths find caustics by rare chance only (causticVariance 32 to 4700 on four scenes of
-// the suite, below 0.1 on the others). Where lamps are merely hidden, camera paths are noisy everywhere alike, which is
-// what filters are good at: without photons 0.5 to 0.8 of the error at equal time behind a door ajar, and among ten
-// thousand lamps 1.5 in half a second, 0.8 in eight.
+// Where photons pay: where camera paths find caustics by rare chance only. Where lamps are merely hidden, camera paths
+// are noisy everywhere alike, which is what filters are good at (combiners/EXPERIMENTS.md, Where photons and
+// connections pay).
 constexpr double kCausticVariance = 10;
-// Connections take 1.5 to 2.3 times the time of camera paths. Beside a photon map they win, up to 1.6x, where caustics
-// are 7 % of the light and more, but for a draw behind glass. Where caustics cannot be met by camera paths at all, the
-// unbiased image needs them.
+// Connections cost more than camera paths: beside a photon map they pay where caustics are much of the light. Where
+// caustics cannot be met by camera paths at all, the unbiased image needs them.
 constexpr double kCausticShare = 0.04;
 constexpr double kUnreachableShare = 0.001;
 

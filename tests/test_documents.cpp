@@ -24,12 +24,6 @@ const std::vector<std::string> kTopFolders = {"renderer", "integrators", "combin
                                               "tools",    "tests",       "scenes"};
 constexpr size_t kLongestComment = 12;
 
-// Documents of combiners/ are being written, and its comments shortened.
-bool awaited(const std::string& what) {
-  return what.rfind("combiners", 0) == 0 || what.find("combiners/README.md") != std::string::npos ||
-         what.find("combiners/EXPERIMENTS.md") != std::string::npos;
-}
-
 struct Text {
   std::string path;  // relative to the repository
   std::string content;
@@ -199,8 +193,7 @@ TEST_CASE("Links of documents lead to files and headings of the repository") {
   for (const Text& document : filesOf({".md"}))
     for (const std::string& link : linksOf(document.content)) {
       ++links;
-      CHECK_MESSAGE((leads(document, link) || awaited(link)), document.path, " links to ", link,
-                    ", which is not there");
+      CHECK_MESSAGE(leads(document, link), document.path, " links to ", link, ", which is not there");
     }
   CHECK(links > 20);
 }
@@ -213,8 +206,7 @@ TEST_CASE("Every section that code cites exists") {
         ++citations;
         const fs::path file = fs::path(BRAID_SOURCE_DIR) / c.document;
         const bool found = fs::exists(file) && resolves(c, headingsOf(read(file)));
-        CHECK_MESSAGE((found || awaited(c.document)), source.path, " cites ", c.document, ", ", c.text.substr(0, 60),
-                      ": no such heading");
+        CHECK_MESSAGE(found, source.path, " cites ", c.document, ", ", c.text.substr(0, 60), ": no such heading");
       }
   CHECK(citations > 3);
 }
@@ -222,8 +214,7 @@ TEST_CASE("Every section that code cites exists") {
 TEST_CASE("Files that documents and comments name are there") {
   const auto check = [](const std::string& where, const std::string& text) {
     for (const std::string& file : namedFiles(text))
-      CHECK_MESSAGE((fs::exists(fs::path(BRAID_SOURCE_DIR) / file) || awaited(file)), where, " names ", file,
-                    ", which is not there");
+      CHECK_MESSAGE(fs::exists(fs::path(BRAID_SOURCE_DIR) / file), where, " names ", file, ", which is not there");
   };
   for (const Text& document : filesOf({".md"})) check(document.path, document.content);
   for (const Text& source : sources())
@@ -233,8 +224,7 @@ TEST_CASE("Files that documents and comments name are there") {
 TEST_CASE("Nothing cites what is not in the repository") {
   for (const Text& file : filesOf({".h", ".cpp", ".def", ".cmake", ".md", ".py", ".sh", ".txt", ""}))
     for (const std::string& word : kForbidden)
-      CHECK_MESSAGE((file.content.find(word) == std::string::npos || awaited(file.path)), file.path, " mentions ",
-                    word);
+      CHECK_MESSAGE(file.content.find(word) == std::string::npos, file.path, " mentions ", word);
 }
 
 TEST_CASE("The front page is short, and every folder says what it is for") {
@@ -242,17 +232,16 @@ TEST_CASE("The front page is short, and every folder says what it is for") {
   CHECK(lines.size() <= 150);
   for (const std::string& line : lines) CHECK_MESSAGE(charactersOf(line) <= 120, "README.md: ", line);
   for (const std::string& folder : kTopFolders)
-    CHECK_MESSAGE((fs::exists(fs::path(BRAID_SOURCE_DIR) / folder / "README.md") || awaited(folder)), folder,
-                  " has no README.md");
+    CHECK_MESSAGE(fs::exists(fs::path(BRAID_SOURCE_DIR) / folder / "README.md"), folder, " has no README.md");
 }
 
 TEST_CASE("Comments say why in a few lines, and hold no tables of results") {
   for (const Text& source : sources())
     for (const std::vector<std::string>& comment : commentsOf(source, false)) {
-      CHECK_MESSAGE((comment.size() <= kLongestComment || awaited(source.path)), source.path, ": a comment of ",
-                    comment.size(), " lines, which begins ", comment.front());
+      CHECK_MESSAGE(comment.size() <= kLongestComment, source.path, ": a comment of ", comment.size(),
+                    " lines, which begins ", comment.front());
       for (const std::string& line : comment)
-        CHECK_MESSAGE((!isTableRow(line) || awaited(source.path)), source.path, ": a table in a comment: ", line);
+        CHECK_MESSAGE(!isTableRow(line), source.path, ": a table in a comment: ", line);
     }
 }
 

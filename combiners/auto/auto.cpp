@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // "auto": the best image that the inputs allow, without a choice for the user. The rule and its reasons are in
 // combiners/auto/auto.md; its steps are
-//   1. x: the unbiased image, fused with photon maps by their estimated errors (fused_estimate.h);
-//   2. fireflies of x that one or two quarters alone speak for are replaced (fireflies.h);
-//   3. bases: patch-Welch filters of x, of its direct and indirect light apart where these are known (light_parts.h),
-//      and the denoisers that the user asked for;
-//   4. candidates: every base, and x shrunk towards it (shrinkage.h);
-//   5. an ensemble of the candidates, with errors measured across halves (relative_weights.h);
-//   6. the result filtered once more, where halves show its use (second_pass.h);
-//   7. the error map (error_map.h), plus the squared bias that the photon maps admit.
+//   1. fuse: the unbiased image x joins the photon maps (fused_estimate.h);
+//   2. remove fireflies of x that one or two quarters alone speak for (fireflies.h);
+//   3. filter x, its direct and indirect light apart where they are known (direct_indirect.h);
+//   4. shrink x towards every filter (shrinkage.h): filters and shrunk images are the candidates;
+//   5. combine them by errors measured across halves (relative_weights.h);
+//   6. refilter the result, where halves show its use (refilter.h);
+//   7. estimate the error (half_statistics.h), with the squared bias that the photon maps leave.
 // x itself is no candidate: halves cannot see the error of a firefly in the half that holds it.
 #include <algorithm>
 #include <array>
@@ -43,13 +42,14 @@ const OptionInfo kFireflies{"auto-remove-fireflies", 1, "0: keep fireflies"};
 constexpr uint64_t kFewestPasses = 4;       // fewer: the first filter alone
 constexpr uint64_t kFirstOrderPasses = 64;  // fewer: slopes fit noise
 
-// The careful filter is for what the wide one takes for noise, which is small: more neighbours than the 49 up to this
-// distance change no error.
+// The careful filter is for what the wide one takes for noise, which is small (combiners/EXPERIMENTS.md, Careful
+// filter).
 constexpr PatchWelchNeighbours kCarefulNeighbours{4, 4};
 constexpr int kFirstOrderStride = 7;  // with a careful filter beside it, fits every fifth pixel change no error either
 
-// What images from filters of both parts keep of the squared bias that their halves show, found on the suite (auto.md):
-// less than all, for filters blur less as variances fall, and more than half, for not all bias goes with the variance.
+// What images from filters of direct and indirect light keep of the squared bias that their halves show
+// (combiners/EXPERIMENTS.md, Bias that filters keep): filters blur less as variances fall, but not all bias goes with
+// the variance.
 constexpr double kBiasKeptByParts = 0.85;
 
 class Auto : public Method {
@@ -89,7 +89,7 @@ MethodMemory Auto::memory(const MemoryCase& of) const {
   return {std::max(44 + 88 * bases, refilterBytes) + fused, 44 + 8 * bases};
 }
 
-// Whether errors can be measured across halves. Images of other renderers may not tell their passes.
+// Whether errors can be measured across halves. Images of other renderers may not say their passes.
 bool mayBeMeasured(const Estimate& x) { return x.passes == 0 || x.passes >= kFewestPasses; }
 
 // The filters of x, fewer once cancelled: a wide one, from 64 passes on its first-order fit instead, and last a careful
@@ -214,7 +214,7 @@ void addTo(Plane<float>& sum, const Plane<float>& other) {
     sum[i] = finiteFloat(static_cast<double>(sum[i]) + static_cast<double>(other[i]));
 }
 
-// The unbiased image fused with the photon maps, without the bias that these tell.
+// The unbiased image fused with the photon maps, which are corrected by their own bias estimates.
 FusedEstimate fusedWith(std::vector<const Estimate*> photonMaps, const MethodInputs& in) {
   if (in.options.number(kDebias) == 0) return fusedEstimate(*in.unbiased, photonMaps, in.features);
   std::vector<Estimate> corrected;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A combined image filtered once more.
+// A combined image filtered once more (combiners/EXPERIMENTS.md, Refiltering).
 //
 // Filters of noisy images leave blotches: weights that single pixels have chosen by noise. In the image that they made
-// this noise is small, and pixels can be told apart that the samples could not. RDFC does so with its own images
-// (Rousselle et al. 2013; ALGORITHMS 4.6, step 7); here it is done with what an ensemble has chosen.
+// this noise is small, and pixels can be distinguished that looked alike in the samples. RDFC does so with its own
+// images (combiners/README.md, RDFC); here it is done with what an ensemble has chosen.
 #pragma once
 
 #include <atomic>

@@ -28,9 +28,8 @@ struct ConvergenceCurve {
 // deviations of log I; two points that are a doubling apart have 0.24, four 2.4.
 std::optional<ConvergenceCurve> fitCurve(std::span<const CurvePoint> points, size_t most, double prior = 0);
 
-// The line of a given slope through one point. A slope of -1 is the law of Monte Carlo and gives W = I v / SURE; -2 is
-// what the second point of the paper comes to, V_{N-K} = V_K / (N/K - 1)² at N - K samples for any N and K, and gives
-// W = I sqrt(v / SURE).
+// The line of a given slope through one point. A slope of -1 is the law of Monte Carlo; the second point of the paper
+// comes to -2 (combiners/README.md, Convergence curves).
 ConvergenceCurve curveOfSlope(const CurvePoint& point, double slope);
 
 struct CurveSettings {

@@ -1,35 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blending by convergence curves (Denisova and Bocchi 2024, "Converging Algorithm-Agnostic Denoising for Monte Carlo
-// Rendering"): every pixel and channel is
+// Blending by convergence curves (combiners/README.md, Convergence curves): every pixel and channel is
 //   out = (I n + W d) / (I + W),
-// where I is the number of passes of the noisy image n, and W the number of passes at which the noisy image will be as
-// good as the denoised image d. The error of d is Stein's unbiased risk estimate, for which the denoiser runs twice
-// more; W comes from the line through the logarithms of earlier variances (combiners/curves/curve_weight.h). The
-// denoised image fades as the render converges.
+// where I is the number of passes of the noisy image n, and W the number at which it will be as good as the denoised
+// image d. The denoised image fades as the render converges. Options bring the paper back; what they gain:
+// combiners/EXPERIMENTS.md, Small risks of curves; Relative maps of curves; Lone fireflies first.
 //
-// Earlier variances are filtered with the width of the newest, so that the curve of a pixel describes one region.
-//
-// Lone fireflies of the noisy image that do not contradict the denoised one are replaced by it whole (curves-gate; the
-// paper keeps 1 / (1 + 64) of them at least): over 14 scenes at 16 to 256 samples, with nfor, the error is 1.09 of that
-// of the better input instead of 1.63, and below it in 25 cases of 42 instead of 11. Their noise falls as 1/I like all,
-// and then they contradict any image that is wrong.
-//
-// Maps are filtered relative to the squared level of the pixel (curves-relative; the paper: as they are), so that lamps
-// do not hide what is wrong in the dark around them: with nfor, over 14 scenes at 16 to 128 samples, the error is 0.98
-// of that of the better input instead of 1.08.
-//
-// So are risks that are small beside the noise: over 11x11 pixels they are taken towards those of 41x41 where they are
-// not told apart (curves-pool, SureMapFilter), and the covariance of both errors, which the risk estimate holds, counts
-// in the weights (curves-covariance: W is that of the independent image that would be worth as much). The slope of
-// curves is taken towards that of Monte Carlo, -1 (curves-slope-prior, curves-fallback-slope). Over 14 scenes at 32 and
-// 128 samples, with nfor, these bring the error from 1.014 of that of the better input to 0.95: pooling by 0.96, the
-// covariance by 0.985, the slope by 0.99.
-//
-// Denoising may stop at some number of passes (in.stopped): d and its error are then those of the noisy image of that
-// time, with the features of now, while n and the curve are the newest. W never exceeds its value at the stop, so that
-// the share of d goes to 0 and the image converges like the noisy one. Variances of later passes may lower W; to let it
-// grow, with its limits or with the noise of the curve, would bring the old image back. A d whose error was taken for
-// much smaller than it is fades only when I is large against the most that W may be.
+// Earlier variances are filtered with the width of the newest, so that the curve of a pixel describes one region. Where
+// denoising has stopped, d is that of the noisy image of that time, and W never exceeds its value then: to let it grow,
+// by its limits or by the noise of the curve, would bring the old image back.
 #include <algorithm>
 #include <cmath>
 

@@ -11,12 +11,12 @@ namespace braid {
 // The Gaussian of gaussianFiltered() (sure_map.h), in which pixels may count in units of their own squared level.
 //
 // What is wrong with a denoised image in dark pixels is nothing beside the noise of a lamp or of its mirror image among
-// them. In units of level² + 0.01 (of images of order 1) every pixel of the window counts by its relative error, as in
-// relL2. The level is that of the denoised image: units that know the noise would hide it.
+// them. In units of level² + 0.01 every pixel of the window counts by its relative error. The level is that of the
+// denoised image: units that know the noise would hide it.
 //
-// A risk may be a small share of the variance that it is the rest of, and then 121 pixels do not tell it from 0. The
-// ratio of risk to variance over 41x41 pixels does, but is not everywhere the same. Pooled risks start from it and keep
-// of the difference d to the mean of the 121 what their scatter s² leaves standing, d max(0, 1 - 3 s² / (121 d²)).
+// 121 pixels do not distinguish a small risk from 0. The ratio of risk to variance over 41x41 pixels does, but is not
+// everywhere the same. Pooled risks start from it and keep of the difference d to the mean of the 121 what their
+// scatter s² leaves standing, d max(0, 1 - 3 s² / (121 d²)).
 class SureMapFilter {
  public:
   // `level`: null counts pixels as they are.

@@ -33,9 +33,9 @@ const OptionInfo kPrior{"ensemble-prior",
                         1e6,
                         false};
 
-constexpr double kImprovement = 1e-4;  // a hundredth of it changes errors by 1e-5 and takes 1.15x as long
+constexpr double kImprovement = 1e-4;  // combiners/EXPERIMENTS.md, Precision of ensemble weights
 
-// Fewer passes leave too few in each half to tell the bases apart.
+// Fewer passes leave too few in each half to distinguish the bases.
 constexpr uint64_t kFewestPasses = 8;
 
 class Ensemble : public Method {

@@ -13,8 +13,7 @@ namespace braid {
 namespace {
 
 constexpr double kVarianceShare = 0.3;  // of a pixel's scale
-// Weights are solved for blocks of so many pixels in x and y. For every pixel, the error of "auto" is lower by 0.1 to
-// 0.3 %.
+// Weights are solved for blocks of so many pixels in x and y (combiners/EXPERIMENTS.md, Choices of auto).
 constexpr int kStride = 2;
 constexpr double kImprovement = 1e-5;  // weights to 1e-9 of the error change nothing
 

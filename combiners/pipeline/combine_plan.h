@@ -4,28 +4,11 @@
 //
 // A method is named by its name in the registry. Three forms add to it:
 //   name:parameter   a method that takes a parameter, such as external:FILE; the rest of the text is the parameter
-//   name@biased      the method with this biased input instead of the default one, such as js@ensemble; the input may
-//                    itself have an input: js@easy@nfor
+//   name@biased      the method with this biased input, which may itself have one: js@ensemble, js@easy@nfor
 //   name:passes      a method that stops denoising, such as curves:128 (combiners/pipeline/denoise_cutoff.h)
 //
-// Names of methods go before names of estimates: an image that a file holds from an earlier run of a method is not used
-// under that method's name.
-//
-// How the roles are filled:
-//   unbiased    as named, or the first estimate that is unbiased and whose pixels are independent; or else the first
-//               with halves and variance and no estimate of its bias, such as vcm's: what it is off by is not seen.
-//   correlated  as named, or the first estimate that is unbiased and whose pixels are correlated.
-//   biased      after '@', or as named for all; or else the first denoiser asked for; or else the first biased
-//               estimate beside it, but not for methods that run the denoiser again (SURE); or else the first that runs
-//               of oidn, nfor, rdfc, pw, nlm; or else the first other denoiser that runs. Never box, which is input for
-//               stress tests. The named input itself gets the default one when it needs a biased input.
-//   bases       after '@' with '+' between them, as in ensemble@nfor+rdfc; or as named for all; or else the denoisers
-//               asked for and, when they are too few, all denoisers that run but box; and for methods that want them
-//               the other biased estimates.
-//
-// Where denoising stops: a method after its stop, if the image of then was kept, gets a step of its own for its
-// denoiser, called like nfor-stop128, which reads that image; the denoiser does not run on the newest image unless it
-// has to for others.
+// How roles are filled where no user names an estimate: combiners/README.md, How estimates become an image. Names of
+// methods go before names of estimates: an image that a file holds from an earlier run of a method is not used.
 #pragma once
 
 #include <memory>

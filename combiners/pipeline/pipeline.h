@@ -13,7 +13,7 @@
 
 namespace braid {
 
-// The pipeline tells methods by this option which factor their inputs were multiplied by; for those that read files.
+// By this option methods that read files learn which factor their inputs were multiplied by.
 inline const OptionInfo kPipelineExposure{"pipeline-exposure", 1, "Factor of the exposure normalisation"};
 
 struct PipelineOptions {

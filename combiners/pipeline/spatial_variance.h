@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Variance and halves for images that come without: one image of another renderer, of which nothing else is known.
-// Neither is as good as what a render can tell of itself.
+// Neither is as good as what a render knows of itself (combiners/EXPERIMENTS.md, Variance of a single image).
 #pragma once
 
 #include "renderer/film/estimates.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Windows that are mirrored at the borders of the image without repeating the edge, as the James-Stein combiner wants
-// them: every block has the same number of pixels, and mirrored ones count twice (ALGORITHMS 0 and 1.1).
+// them: every block has the same number of pixels, and mirrored ones count twice (combiners/README.md, Windows).
 #pragma once
 
 #include "renderer/film/box_sum.h"

@@ -28,7 +28,7 @@ inline FloatLanes loadLanes(const float* p) {
 inline void storeLanes(float* p, FloatLanes v) { std::memcpy(p, &v, sizeof(v)); }
 
 // Keeps a loaded vector in a register: gcc 12 would read it from memory again at every use, and the processor wait for
-// its loads (the sums of products of a regression take 1.6x as long).
+// its loads (combiners/EXPERIMENTS.md, Speed of inner loops).
 inline void keepInRegister([[maybe_unused]] FloatLanes& v) {
 #if defined(__AVX512F__)
   __asm__("" : "+v"(v));

@@ -11,9 +11,9 @@ namespace braid {
 // of the guide, summed over RGB as well: two pixels of one colour then have E|g_i - g_c|² = v_i + v_c.
 class ColourWeights final : public WindowWeights {
  public:
-  // James-Stein (ALGORITHMS 1.2 step 2): v = 0, constant = 2 kappa + 0.01.
+  // James-Stein (combiners/README.md, Regression): v = 0, constant = 2 kappa + 0.01.
   ColourWeights(const Rgb<float>& guide, float constant);
-  // Double shrinkage (ALGORITHMS 3.2): constant 0.01; s = 0 to fit (Eq. 12), 1 to reconstruct (Eq. 17).
+  // Double shrinkage: constant 0.01; s = 0 to fit (Eq. 12), 1 to reconstruct (Eq. 17).
   ColourWeights(const Rgb<float>& guide, const Plane<float>& variance, float constant, bool subtractVariance);
 
   void row(int cx, int cy, int y, int x0, int x1, float* out) const override;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Collaborative first-order regression: the engine of James-Stein's optimised biased image (ALGORITHMS 1.2), of the
-// radiance prior of double shrinkage (3.2) and of NFOR (4.5).
+// Collaborative first-order regression (combiners/README.md, Regression): the engine of James-Stein's optimised biased
+// image, of the radiance prior of double shrinkage and of NFOR.
 //
 // About every centre c a colour is fitted as a linear function of features, x ≈ b0 + Σ_k b_k (f_k - f_k(c)), by
 // weighted least squares over a square window that is clipped at the borders. Every pixel i then averages the
 // predictions of the models about it:
 //   out_i = (Σ_c w(c,i) x̂_c(i) + fallbackWeight * fallback_i) / (Σ_c w(c,i) + fallbackWeight).
 // Models sit at every stride-th pixel in x and y. Without the fallback a stride is harmful: thin geometry and glints
-// that resemble no strided centre would get the average of strangers (ALGORITHMS-BEYOND 3).
+// that resemble no strided centre would get the average of strangers.
 #pragma once
 
 #include <array>

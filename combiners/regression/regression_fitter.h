@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fits the model of one centre (ALGORITHMS 1.2 steps 2-4, 3.2).
+// Fits the model of one centre (combiners/README.md, Regression).
 #pragma once
 
 #include <algorithm>
@@ -71,7 +71,7 @@ class Fitter {
 
   // The same, from its weights. All rows of the design matrix are made at once, for loops over a few vectors each would
   // wait for their ends; two vectors at a time, after the roots and quotients of all of them, whose latency a single
-  // vector's work does not hide (a regression takes 1.05x as long otherwise).
+  // vector's work does not hide.
   template <size_t kColours, bool kShared>
   void appendRow(int y, Span xs) {
     const int planes = job_.features.planes();
@@ -114,7 +114,7 @@ class Fitter {
   }
 
   // What the window of the next centre reads beyond this one: hundreds of rows are too many for the processor to
-  // foresee (a regression takes 1.13x as long without).
+  // foresee (combiners/EXPERIMENTS.md, Speed of inner loops).
   static void prefetch(const PackedRows& planes, const float* row, int length) {
     for (int k = 0; k < planes.planes(); ++k, row += planes.pitch()) __builtin_prefetch(row + length + kLanes);
   }

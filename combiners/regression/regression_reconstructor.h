@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Adds up the predictions of all models about a pixel (ALGORITHMS 1.2 step 5, 3.2), in gather form: a task owns its
-// pixels and runs through the models in a fixed order.
+// Adds up the predictions of all models about a pixel (combiners/README.md, Regression), in gather form: a task owns
+// its pixels and runs through the models in a fixed order.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an unbiased image tells of a photon map's bias that the photon map does not know of.
+// What an unbiased image shows of a photon map's bias that the photon map does not know of.
 #pragma once
 
 #include "renderer/film/estimates.h"

@@ -1,31 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// "double-shrinkage": DSCombiner (ALGORITHMS 3) without its network. Every pixel is the precision-weighted mean of an
-// unbiased image, a biased one (a photon map's or a denoiser's) and a smooth prior fitted to both; all squared errors
-// are estimated from variances and halves.
+// "double-shrinkage": DSCombiner (combiners/README.md, Double shrinkage) without its network. Every pixel is the
+// precision-weighted mean of an unbiased image, a biased one (a photon map's or a denoiser's) and a smooth prior fitted
+// to both; all squared errors are estimated from variances and halves. Options bring the paper back; what they gain:
+// combiners/EXPERIMENTS.md, Priors beside photon maps; Lone fireflies first; Correcting photon maps by their own bias.
 //
-// Lone fireflies of X_u that do not contradict X_b are replaced by it first (double-shrinkage-gate; not in the paper),
-// and their variance, of more than 5 deviations around, counts as 1/25: with all of it X_u would be given up for a
-// whole window, and with nothing what other pixels have not met yet would be forgotten. With sppm on the six scenes
-// that have photon maps, at 8 to 256 samples, the error falls from 1.23 of that of js to 0.78.
-//
-// Nor in the paper: a photon map first loses the bias that it tells (double-shrinkage-debias; debias.h): 0.93 of the
-// error on four scenes at 16 to 1024 samples, 0.75 at best. Its own fireflies are replaced
-// (double-shrinkage-remove-fireflies), its bias is no less than the halves show it (unknown_bias.h), and light that X_u
-// has not met, but the photon map has, counts as X_u's error (both double-shrinkage-measured).
-//
-// Beside a photon map, the prior is fitted to X_u + kappa_1⁴ (X_b - X_u) instead of X_u, and measured against it
-// (double-shrinkage-fused): where light is rare X_u has no error to show, nor has a prior that lacks the same light.
-// Where X_u is worth something this is X_u itself; against the mean with kappa_1, a bias of the photon map would not
-// show in a prior that shares it. The prior counts only where halves show the mean to be better with it, by relative
-// errors over 15x15 pixels (double-shrinkage-chosen).
-//
-// With bdpt and sppm on 14 scenes, at 8 to 128 samples, the first two lower the error to 0.8 of that with the gate
-// alone, and all the others, with eta² in units of the brightness, to 0.77 of that: 0.19 in a pool, 1.19 at worst.
-//
-// Halves of the result: the half h combines X_u^h, X_b^h and the prior of half h, fitted to that half alone, with the
-// weights of the result, like the halves of an ensemble: the weights have seen both halves. The error map is measured
-// across the halves of the result; the variance of the posterior, its alternative without halves, is too small wherever
-// a firefly lowered eta².
+// Half h of the result combines X_u^h, X_b^h and the prior of half h, fitted to that half alone, with the weights of
+// the result, which have seen both halves. The error map is measured across the halves; the variance of the posterior,
+// its alternative without halves, is too small wherever a firefly lowered eta².
 #include "combiners/shrinkage/double_shrinkage.h"
 
 #include <algorithm>
@@ -73,7 +54,7 @@ const OptionInfo kChosen{"double-shrinkage-chosen", 1,
                          "1: take the prior where halves show it to be of use; 0: everywhere (paper)"};
 
 constexpr int kRadius = 6;        // of the filter of the biased image's variance
-constexpr int kChoiceRadius = 7;  // of the patches that tell whether the prior is of use
+constexpr int kChoiceRadius = 7;  // of the patches that show whether the prior is of use
 
 // a + weight (b - a), not below 0.
 Rgb<float> blend(const Rgb<float>& a, const Rgb<float>& b, const Plane<float>& weight) {
@@ -149,10 +130,8 @@ struct PriorInput {
 };
 
 // The prior of all samples and those of the halves, each by a fit of its own. `first` is the first shrinkage: what the
-// prior falls back to. Those of the halves go into the halves of the result and tell how good the prior is, no pixel of
-// the mean is theirs: with models twice as far apart they do as well (errors are 1.000 of those with as many models for
-// all towards pw, over 8 scenes at 16, 64 and 256 samples, and 1.002 towards photon maps, over 6 scenes at 8, 32 and
-// 128) in half the time for all three.
+// prior falls back to. No pixel of the mean is made of the halves' priors, which measure how good the prior is: their
+// models may stand twice as far apart (combiners/EXPERIMENTS.md, Models of the halves' priors).
 Estimate ownFits(const MethodInputs& in, const PriorInput& of, const Estimate& first, int stride,
                  RegressionReport& report) {
   const Estimate &x = *of.x, &y = *in.biased;
@@ -224,8 +203,8 @@ Estimate withoutFireflies(const Estimate& x, const Estimate& y, Rgb<float>& vari
   return out;
 }
 
-// What is read of a photon map: without the bias that it tells, and without its fireflies, which would be spread by a
-// prior that is fitted to them.
+// What is read of a photon map: corrected by its own bias estimate, and without its fireflies, which a prior that is
+// fitted to them would spread.
 Estimate prepared(const MethodInputs& in) {
   Estimate map = in.options.number(kDebias) != 0 ? debiased(*in.biased) : *in.biased;
   if (in.options.number(kFireflies) == 0) return map;
@@ -332,7 +311,7 @@ MethodResult DoubleShrinkageMethod::run(const MethodInputs& given) const {
   out = meanOf(x, variance, y, maps.toBiased);
   out.unbiased = false;
 
-  // Without halves nothing tells how good a prior is.
+  // Without halves nothing shows how good a prior is.
   if (halves && in.options.number(kStage) >= 2 && in.options.number(kPrior) < 2) {
     const Estimate first = std::move(out);
     PriorInput of = {&x, &variance, errorU};

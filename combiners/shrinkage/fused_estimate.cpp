@@ -14,9 +14,9 @@ namespace braid {
 
 namespace {
 
-// Photon maps tell the bias of curved irradiance in full, but 0.41 of its square at edges of light and the rims of
-// surfaces (sppm_gather.h); measured over images of 64 and 512 passes it is 0.35 to 0.84. And filters take away later
-// what noise adds here, but not what bias does. Hence squared biases count twice, a factor fitted to four scenes.
+// Photon maps find the bias of curved irradiance in full, but 0.41 of its square at edges of light
+// (integrators/README.md, Bias of photon maps), and filters take away later what noise adds here, but not what bias
+// does: squared biases count twice (combiners/EXPERIMENTS.md, Bias of photon maps counts twice).
 constexpr double kUnestimatedBias = 2;
 
 Plane<float> withUnestimated(Plane<float> squaredBias) {
@@ -43,7 +43,7 @@ double squaredShare(const WeightMaps& weights, size_t k, size_t i) {
   return w * w;
 }
 
-// Adds what of the variance of the k-th image is left in the combination. That of the pixel itself: smoothed, an
+// Adds what of the variance of the k-th image is left in the combination. That of the pixel itself: smoothed, a
 // firefly's would make noise of its clean neighbours, which filters would then replace by the firefly.
 void addVariance(Rgb<float>& sum, const WeightMaps& weights, size_t k, const Rgb<float>& variance) {
   parallelChunks(sum.size(), kPixelChunk, [&](size_t begin, size_t end) {

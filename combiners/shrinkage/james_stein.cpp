@@ -1,34 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// "js": the James-Stein combiner (Gu et al. 2022; ALGORITHMS 1) without its network: variances are box averages and
-// alpha is 1/2. The unbiased image is pulled, block by block, towards a biased image that was first fitted to it by a
-// crossed half-buffer regression.
+// "js": the James-Stein combiner (combiners/README.md, James-Stein) without the network of the paper: variances are box
+// averages and alpha is 1/2. The unbiased image is pulled, block by block, towards a biased image that was first fitted
+// to it by a crossed half-buffer regression.
 //
-// The paper counts on its never being worse than the unbiased image, which holds where the noise of a block is even and
-// the biased image does not depend on it. Four things keep nearer to that; the first two in numbers of cases out of 56
-// (14 scenes at 8 to 256 samples) that are worse than the unbiased image, and the mean gain:
-//   - Lone fireflies are replaced first (js-gate): towards pw 5 cases, 1.3x at worst, and a gain of 5.6, instead of 11,
-//     8.9x and 4.1.
-//   - Where a denoiser has kept what it could not tell from noise, a fit to it follows that noise and hides it from the
-//     factor; elsewhere it mends what the denoiser did. So the fit is taken where it is nearer to the other half of the
-//     samples than the biased image itself (js-regression 2; relative_weights.h): towards pw 0 cases and a gain of 6.3
-//     instead of 3 and 5.6, rdfc 2 (1.07x) and 7.2 instead of 4 (1.3x) and 6.3, box 6 and 5.8 as before.
-//   - The factor is never below the one that the halves measure (js-measured; measured_factors.h): on glossy
-//     plates, towards box, 0.84 of the unbiased image's error at 32 samples instead of 3.7, 0.91 at 128 instead
-//     of 2.2. Lone fireflies have a factor of their own: a lamp's mirror image agrees with itself in both halves, where
-//     it was replaced, and so do its neighbours; on the plates 0.98 at 64 and at 128 samples instead of 1.10 and 1.09,
-//     0.99 of before on 14 scenes at 8, 32 and 128.
-//   - Halves that a denoiser filtered with the weights of all samples hide their noise from all of the above. Where the
-//     quarters allow it, it is run again on each half by itself (js-own-halves): towards rdfc, which that takes twice
-//     more, 0.95 of the unbiased image's error on leaves at 128 samples instead of 1.03, and 0.98 of before on 14
-//     scenes.
-// A constant of 1.25 is a little worse in all of these than the paper's 1.
+// It promises never to be worse than the unbiased image where the noise of a block is even and the biased image does
+// not depend on it. Lone fireflies, fits only where they help, measured factors and own halves keep nearer to that
+// (combiners/EXPERIMENTS.md, Gating James-Stein; Fits only where they help; Measured factors of James-Stein; Own halves
+// of RDFC).
 //
-// Halves of the result. With js-regression the half h is JS(X^h, its variance, own fit of half h): the halves share the
-// bandwidth kappa and the variance of all samples, but no pixel values, so that errors can be measured across them.
-// Their mean is not the result, whose Y* is crossed and whose factors come from all samples. Without js-regression half
-// h is JS(X^h, its variance, Y^h). What halves share beside that are weights and factors over windows: those of the
-// choice of the fit, and the measured factors. With js-crossed the result is the mean of its halves JS(X^A, Ŷ^B) and
-// JS(X^B, Ŷ^A), which depend on each other: there is no error map then.
+// Half h of the result is JS(X^h, its variance, own fit of half h): the halves share weights over windows but no pixel
+// values, so that errors can be measured across them. With js-crossed they depend on each other: no error map.
 #include <utility>
 
 #include "combiners/statistics/half_statistics.h"
@@ -61,7 +42,7 @@ const OptionInfo kMeasured{"js-measured", 1,
 const OptionInfo kOwnHalves{"js-own-halves", 1,
                             "1: where the denoiser's halves share weights, denoise each half by itself; 0: the paper"};
 
-constexpr int kChoiceRadius = 7;  // of the patches that tell whether the fit helps
+constexpr int kChoiceRadius = 7;  // of the patches that show whether the fit helps
 
 // The images that X, X^A and X^B are pulled towards.
 struct Targets {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // James-Stein's optimised biased image Y*: the unbiased image as a local linear function of the biased image and the
-// features, by first-order regression with crossed half buffers (Gu et al. 2022, Section 5.1, Eqs. 10-12; ALGORITHMS
-// 1.2).
+// features, by first-order regression with crossed half buffers (Gu et al. 2022, Section 5.1, Eqs. 10-12;
+// combiners/README.md, James-Stein).
 #pragma once
 
 #include "combiners/regression/regression.h"

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The radiance prior X_p of double shrinkage: one local linear model of the features fitted to the unbiased and the
-// biased image together, with crossed weights (DSCombiner Section 4.2; ALGORITHMS 3.2).
-//
-// Eq. 17 is printed with three errors, which are corrected here: the weighted sum is divided by the sum of its weights;
-// the model of pixel j is evaluated at f_i - f_j, not f_j - f_i, which would double the error of a slope in place of
-// removing it; and the numerator of the exponent is not let below zero, where weights would grow to e.
+// biased image together, with crossed weights (DSCombiner Section 4.2; combiners/README.md, Radiance prior, which also
+// says what is printed wrong in Eq. 17).
 #pragma once
 
 #include <array>

@@ -15,7 +15,7 @@ namespace braid {
 namespace {
 
 constexpr double kContradiction = 3;  // deviations from Y at which a pixel contradicts it
-constexpr int kAround = 2;            // radius of the window that tells how far off Y is
+constexpr int kAround = 2;            // radius of the window that shows how far off Y is
 constexpr double kShare = 0.5;  // of `least`: the most that another such pixel says, which may be a firefly as well
 
 constexpr double kLeastSum = 1e-5;        // released code

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The localised positive-part James-Stein combination of an unbiased image X with any other image Y (Gu et al. 2022,
-// "Neural James-Stein Combiner for Unbiased and Biased Renderings", Section 4; ALGORITHMS 1.1 and 1.4).
+// "Neural James-Stein Combiner for Unbiased and Biased Renderings", Section 4; combiners/README.md, James-Stein).
 //
 // A block of p = 15 x 15 pixels is pulled towards Y by
 //   rho_c = max(0, 1 - c (p - 2) sigma_c² / SSE_c),  SSE_c = Σ (x_i - y_i)²,
 // each channel by itself, and a pixel takes the mean factor of the blocks that hold it (Eq. 13):
 //   out_i = max(0, y_i + mean(rho_c) (x_i - y_i)).
-// The estimator has a lower squared error than X for any Y and any 0 < c < 2. The papers have c = 1; c = 1.25 gives up
-// 6 % of the gain and keeps a good Y from being damaged where a heavy tail has not shown in sigma² (ALGORITHMS-BEYOND
-// 5.3).
+// The estimator has a lower squared error than X for any Y and any 0 < c < 2; the papers have c = 1.
 #pragma once
 
 #include <array>
@@ -36,7 +34,7 @@ struct JamesSteinSettings {
   bool positivePart = true;  // off: factors may be negative, as in the original estimator of James and Stein
   bool global = false;       // one factor for the whole image, the original localisation: none
   bool shared = false;       // one factor for the three channels, from the means of their squares and variances
-  bool gate = false;         // lone fireflies are replaced by Y first (ALGORITHMS-BEYOND 8.3.3)
+  bool gate = false;         // lone fireflies are replaced by Y first (combiners/README.md, Fireflies)
   bool keepFactors = true;   // off: the result has none
 };
 

@@ -15,8 +15,8 @@ struct Firefly {
   Spectrum value{0}, variance{0};
 };
 
-// The fireflies of an unbiased image (ALGORITHMS-BEYOND 8.3, step 6, looks for them in what has been combined; by then
-// filters have spread them over their neighbours). A pixel is one if
+// The fireflies of an unbiased image, before filters spread them over their neighbours (combiners/README.md,
+// Fireflies). A pixel is one if
 //   - its standard deviation, sqrt(mean_RGB v), is above 8 times the mean of these over 15x15 pixels;
 //   - it is brighter than all of its 5x5 neighbours that are no candidates and lie on the same surface, and than the
 //     mean that would replace it;

@@ -6,7 +6,7 @@
 
 namespace braid {
 
-// Whether halves can be told apart like that: halves of at least two passes each, and four quarters.
+// Whether halves can be treated so: halves of at least two passes each, and four quarters.
 bool hasHalfEstimates(const Estimate& estimate, const GivenQuarters& quarters);
 
 // Half h (0 or 1) of the samples: mean and passes of that half, the variance that halfVariance() gives it, and for its

@@ -16,8 +16,8 @@ bool hasHalves(const Estimate& estimate);
 
 // The variance of half h (0 or 1), as far as combiners should trust it. Both halves together have 4 v, where v is the
 // variance of the mean; it is shared out by the squares of their values: twice v for halves that agree, all of it for
-// the one that holds a firefly. With 2 v for both, a half would keep 38 % of a firefly of its own that the result of
-// a James-Stein combination is rid of, and errors measured across halves would be those of worse images.
+// the one that holds a firefly. With 2 v for both, a half would keep part of a firefly that the result is rid of, and
+// errors measured across halves would be those of worse images.
 Rgb<float> halfVariance(const Estimate& estimate, const Rgb<float>& variance, int h);
 
 // Unbiased but noisy: the squared error of `image` at every pixel, averaged over channels,
@@ -27,16 +27,13 @@ Rgb<float> halfVariance(const Estimate& estimate, const Rgb<float>& variance, in
 Plane<float> squaredErrorSamples(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance);
 
 // The smoothed map: u (box3(¼ (z_A - z_B)² / u) + max(0, box15((sample - ¼ (z_A - z_B)²) / (u + v)))), the variance and
-// the squared bias, with u = (mean of `guide`)² + 0.01. Both are averaged as relative errors (ALGORITHMS-BEYOND 8.3,
-// steps 2 and 7, averages them as they are): a lamp would lend the dark pixels around it an error that is beyond
-// anything that they can have. Its sum over the image is meant, not its pixels: where it is smallest it is too small,
-// by selection. The halves must be independent of each other.
+// the squared bias, with u = (mean of `guide`)² + 0.01. Both are averaged as relative errors: a lamp would lend the
+// dark pixels around it an error that is beyond anything that they can have. Its sum over the image is meant, not its
+// pixels: where it is smallest it is too small, by selection. The halves must be independent of each other.
 //
-// The squared bias is that of the halves, which have seen half of the samples. That of an image which shares out
-// between x and something with the squared error b² as their errors ask for it, as James and Stein's does, falls with
-// v: its error is e = v b² / (v + b²), that of a half e' = 2 v b² / (2 v + b²), so that e = e' 2 v / (2 v + e'). With
-// `follows` the squared bias is multiplied by that factor, with means over 15 x 15 pixels; and in any case by `kept`,
-// for filters whose bias falls as they see more samples.
+// The squared bias is that of images of half the samples. `follows`: it falls with v, as that of an image which shares
+// out between x and another one as their errors ask for it (combiners/README.md, Errors across halves). `kept`: it is
+// multiplied by that, for filters whose bias falls as they see more samples.
 Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
                       const Rgb<float>& guide, bool follows = false, double kept = 1);
 

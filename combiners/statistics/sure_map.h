@@ -21,7 +21,7 @@ struct SureMaps {
 // xi standard normal by `seed`, pixel and channel. By Stein's lemma, q is the covariance.
 // The perturbation has `step` s times the deviation of the pixel mean, so no factor of variance is needed; the
 // antithetic pair removes the even orders of f. The derivative wants a small step: a whole deviation, as is usual for
-// networks, doubles the noise, and filters that are told the variance take it for texture.
+// networks, doubles the noise, and filters that know the variance take it for texture.
 SureMaps sureMaps(const Rgb<float>& noisy, const Rgb<float>& denoised, const Rgb<float>& variance, uint64_t seed,
                   double step, const std::function<Rgb<float>(const Rgb<float>&)>& denoise);
 

@@ -9,8 +9,8 @@
 namespace braid {
 
 // Weighted means over (2 radius + 1)² pixels clipped at the borders, weights exp(-|da|² / (2 0.25²) - |dn|² / (2
-// 0.15²)) of the mean albedo and normal (the constants of ALGORITHMS 4.3), the same for all planes. Plain box means
-// where there are no features.
+// 0.15²)) of the mean albedo and normal (combiners/README.md, Weight bilateral), the same for all planes. Plain box
+// means where there are no features.
 std::vector<Plane<float>> surfaceSmooth(const std::vector<const Plane<float>*>& planes, const Features* features,
                                         int radius);
 

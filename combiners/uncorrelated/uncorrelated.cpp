@@ -1,21 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Input-dependent uncorrelated weighting: an unbiased image of independent pixels and an unbiased image of correlated
 // ones, whose differences are better than its pixels, make one with less noise and hardly any bias
-// (combiners/uncorrelated/uncorrelated_filter.h has the formula).
+// (combiners/README.md, Uncorrelated weighting).
 //
-// Fireflies are shared out first, among more pixels than a window has (uncorrelated-share-out;
-// uncorrelated_noise.h).
-//
-// gamma is the candidate whose results differ least between two halves of the samples. The image itself takes its
-// weights from the two halves of the correlated image. Where the correlated image was reconstructed from the samples of
-// the independent one (gradients), each half of the one is combined with the other half of the other instead, and the
-// results are averaged.
-//
-// Where the correlated image is much noisier than the other one, or pixels of a window differ much in noise, the
-// combination has more error than the independent image. Halves tell how much of it to take, and the plain mean of both
-// images makes up the rest (uncorrelated-measured; uncorrelated_share.h). With the independent image alone for the
-// rest, the error was 1.07 times that over the eight scenes of path tracing at 8 to 64 samples, and up to 2.6 times
-// that of the better input.
+// gamma is the candidate whose results differ least between two halves of the samples. Where the correlated image was
+// reconstructed from the samples of the independent one (gradients), each half of the one is combined with the other
+// half of the other, and the results are averaged. Fireflies are shared out first, and halves say how much of the
+// combination to take (combiners/EXPERIMENTS.md, Sharing out fireflies; The rest of uncorrelated weighting).
 #include <algorithm>
 #include <optional>
 

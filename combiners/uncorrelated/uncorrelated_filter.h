@@ -1,21 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The combination of an independent and a correlated image with weights that depend on the input and yet are nearly
-// uncorrelated with it ("Input-Dependent Uncorrelated Weighting for Monte Carlo Denoising", 2023):
+// uncorrelated with it (combiners/README.md, Uncorrelated weighting):
 //   out_c = y_c + Σ k_i [(z_c - z_i) - (y_c - y_i)],   k_i = exp(-gamma n (D1 - D2)²) / 224   (Eqs. 5 and 8),
-// over the other 224 pixels of a 15x15 window that is mirrored at the borders, for every colour channel. D1 and D2 are
-// the differences of pixels c and i in two averages of n samples each of the correlated image z: where they agree, z
-// knows that difference well. k does not change with a common offset of an average or the sign of a difference.
+// over the other 224 pixels of a 15x15 window that is mirrored at the borders. With h = z1 - z2 and g = z - y it is
+// out_c = y_c + Σ k(h_c - h_i) (g_c - g_i): one plane decides the weights and one is averaged.
 //
-// With h = z1 - z2 and g = z - y the formula is out_c = y_c + Σ k(h_c - h_i) (g_c - g_i): one plane decides the weights
-// and one is averaged.
-//
-// Pairs of pixels of which one is much more uncertain than the other (a lamp's mirror image beside the dark) are left
-// out, k_i = 0: a 224th of the one's error may be many times the other's own. Left out for both, they change no mean of
-// the image: left out for one, up to 8 % of the light went where rare strong samples make the variance (glass of water
-// at 16 samples). Few neighbours keep glossy reflections of lamps from harm, many find caustics, whose pixels are as
-// uncertain: with pairs of up to 224, 100 and 30 times the variance plates at 16 samples have 1.33, 0.97 and 0.60 times
-// the error of the better input, glass of water 0.04, 0.16 and 0.18 times, and up to 20 times more in single runs.
-// What is uncertain, and what becomes of single strong samples, is for uncorrelated_noise.h to say.
+// Pairs of pixels of which one is much more uncertain (uncorrelated_noise.h) are left out, k_i = 0: a 224th of its
+// error may be many times the other's own. Left out for both pixels, they take no light away (combiners/EXPERIMENTS.md,
+// Pairs of uncertain pixels).
 #pragma once
 
 #include <array>

@@ -15,8 +15,7 @@ namespace braid {
 namespace {
 
 // The square of a mean in units of its variance from which on it is that of several strong samples: k equal ones of
-// many make k, and three are enough. With four, the glint of a lamp that one image had met three times was shared out
-// among thousands of dark pixels: plates at 32 samples had 1.25 times the error, over 60 seeds.
+// many make k, and three are enough (combiners/EXPERIMENTS.md, Sharing out fireflies).
 constexpr double kEstablished = 2.9;
 // Neighbours of the eight that have to be as uncertain, within the factor, for a strong sample to be no firefly.
 constexpr int kFellows = 3;

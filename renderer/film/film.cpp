@@ -14,9 +14,9 @@ namespace braid {
 
 namespace {
 
-// Radius of the box that compares the two variance estimates, in pixels: 9 x 9. RDFC takes 21 x 21; there the noisiest
-// pixels decide for more of their neighbours, who are then reported 15 % too quiet instead of 8 %, while the image's
-// sum is right with either.
+// Radius of the box that compares the two variance estimates, in pixels: 9 x 9. In a larger one the noisiest pixels
+// decide for more of their neighbours, while the image's sum is right with either (combiners/EXPERIMENTS.md, Box of the
+// variance ratio).
 constexpr int kVarianceBoxRadius = 4;
 
 bool acceptable(const Spectrum& v) {

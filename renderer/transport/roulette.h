@@ -15,7 +15,7 @@ struct Roulette {
   static constexpr int kNever = std::numeric_limits<int>::max();
 
   int start = 1;
-  float level = 0.2f;  // of camera paths: 0.82x the error times the seconds of {4, 1}
+  float level = 0.2f;  // of camera paths (combiners/EXPERIMENTS.md, Russian roulette by throughput)
 
   // Probability with which a path goes on; `relative` is its throughput, the compression of radiance by refraction
   // undone.

@@ -50,9 +50,9 @@ std::vector<SweepMethod> chooseMethods(const std::vector<std::string>& names, co
 // Methods that one render session serves, as indices. Methods that share an integrator in equal numbers of passes share
 // its render; integrators that no method uses together run in sessions of their own, so that none pays for buffers of
 // another. Features are those of a session's first integrator: methods that read them share a render only if it is the
-// first of their inputs for all, as in a render for the method alone; with another's features bdpt would seem to have
-// less error than its render shows, for no time (hair at 8 samples: 0.6 of it with double-shrinkage). With `equalTime`
-// only methods of the same inputs share a session: the others reach a time at different rounds.
+// first of their inputs for all, as in a render for the method alone (combiners/EXPERIMENTS.md, Features of a shared
+// render). With `equalTime` only methods of the same inputs share a session: the others reach a time at different
+// rounds.
 std::vector<std::vector<size_t>> groupMethods(const std::vector<SweepMethod>& methods, bool equalTime);
 
 }  // namespace braid

@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The patch-Welch filter: a neighbour is averaged in as far as the difference of the two means is explained by the
-// variances of the means, tested over a patch.
-//
-// It follows the statistical filter of Sakai et al. 2024 ("A Statistical Approach to Monte Carlo Denoising"), whose
-// per-pixel test on transformed samples is replaced by a soft test on patches of albedo-divided radiance with
-// regularised variance. For the pixels p and q = p + d around it:
+// The patch-Welch filter (combiners/README.md, Patch-Welch filter): a neighbour is averaged in as far as the difference
+// of the two means is explained by the variances of the means, tested over a patch. For the pixels p and q = p + d:
 //   z²(p) = mean over RGB of (u_p - u_q)² / (V_p + V_q),      s = mean of z² over 3 x 3 pairs at the same d,
 //   w     = max(0, 1 - s / t²)² exp(-|d|² / 50 - edge terms of albedo and normal),
-// clipped at the borders, and 0 between pixels where every ray has missed the scene and pixels with hits. Where both
-// means have one expectation, E[s] is 1. t is the threshold z as a quantile of Student's distribution with 2n - 2
-// degrees of freedom. V falls as 1/n, hence a neighbour that differs at all is left out in the end: the filter is
-// consistent.
+// clipped at the borders, and 0 between pixels where every ray has missed the scene and pixels with hits. t is the
+// threshold z as a quantile of Student's distribution with 2n - 2 degrees of freedom. V falls as 1/n, hence a neighbour
+// that differs at all is left out in the end: the filter is consistent.
 #pragma once
 
 #include <atomic>

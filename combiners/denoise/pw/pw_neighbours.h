@@ -5,9 +5,8 @@
 namespace braid {
 
 // The pixels that are averaged in: all up to the inner distance in pixels, from there to the outer one every second, as
-// on a chessboard: 173 of the 253 pixels of the disc. Neighbours say much the same, so that the filters with them all
-// take 1.5 times as long for no less error in the mean (-2 to +3 % by number of samples over 14 scenes), and auto for
-// 0.4 % less.
+// on a chessboard: 173 of the 253 pixels of the disc. Neighbours say much the same (combiners/EXPERIMENTS.md,
+// Neighbours of the patch-Welch filter).
 struct PatchWelchNeighbours {
   static constexpr int kMostOuter = 9;
   int inner = 5, outer = kMostOuter;  // 0 <= inner <= outer <= kMostOuter

@@ -19,8 +19,7 @@ namespace {
 constexpr float kLargest = 1e9f;
 constexpr float kMinAlbedo = 0.03f;
 constexpr int kRescaleRadius = 10;
-// Radius of the range of results, which the paper does not have. 1 costs error where there is no lamp (3 %), 3 leaves
-// twice the error beside many lamps.
+// Radius of the range of results, which the paper does not have (combiners/EXPERIMENTS.md, Range of alike pixels).
 constexpr int kRange = 2;
 
 float finiteOrZero(float v) { return std::isfinite(v) ? std::clamp(v, -kLargest, kLargest) : 0.0f; }

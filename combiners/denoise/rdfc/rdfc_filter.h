@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// RDFC (Rousselle, Manzi, Zwicker 2013, "Robust Denoising using Feature and Color Information"): three cross bilateral
-// and non-local means filters on colour and features, the best one chosen at every pixel by Stein's unbiased risk
-// estimate, and a second pass over the result. Constants are those of the authors' program (ALGORITHMS 4.6).
+// RDFC (Rousselle, Manzi, Zwicker 2013; combiners/README.md, RDFC): three cross bilateral and non-local means filters
+// on colour and features, the best one chosen at every pixel by Stein's unbiased risk estimate, and a second pass over
+// the result. Constants are those of the authors' program.
 #pragma once
 
 #include <atomic>
@@ -24,7 +24,7 @@ struct RdfcOptions {
   RdfcVariance variance = RdfcVariance::Sample;
   bool secondPass = true;
   bool removeFireflies = false;  // take fireflies out first (fireflies.h)
-  GivenQuarters quarters = {};   // that tell them; without, the halves do
+  GivenQuarters quarters = {};   // that show them; without, the halves do
 };
 
 struct RdfcResult {
@@ -39,7 +39,7 @@ Rgb<float> rdfcVariance(const Estimate& estimate, RdfcVariance kind);
 // Filters the mean and the halves of an estimate of at least two passes. The halves share all weights and the
 // selection: these come from the mean, its variance, the prefiltered features and, in the second pass, the variance
 // between the filtered halves. With these given, a half of the result is linear in that half of the colour, but for the
-// range that alike pixels about it allow (alike_range.h), and does not see the other one. Features may be null or
+// range that alike pixels about it allow (local_range_clamp.h), and does not see the other one. Features may be null or
 // empty; then there is no third candidate. Without halves there is no second pass. Deterministic for any number of
 // threads. rdfcVariance() must not be empty.
 RdfcResult rdfcDenoised(const Estimate& estimate, const Features* features, const RdfcOptions& options,

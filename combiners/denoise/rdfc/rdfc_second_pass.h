@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The second pass of RDFC (Rousselle et al. 2013; ALGORITHMS 4.6, step 7): filtered images have little noise left, and
-// the variance between their halves tells how much, so that non-local means see what the samples could not show.
+// The second pass of RDFC (combiners/README.md, RDFC): filtered images have little noise left, and the variance between
+// their halves says how much, so that non-local means see what the samples could not show.
 #pragma once
 
 #include <atomic>
