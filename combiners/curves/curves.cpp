@@ -217,8 +217,8 @@ MethodResult Curves::run(const MethodInputs& in) const {
 }  // namespace
 
 uint64_t stopPasses(double number) {
-  constexpr double kFewestPasses = 2, kMostPasses = 1e12;
-  return number >= 1 ? static_cast<uint64_t>(std::clamp(number, kFewestPasses, kMostPasses)) : 0;
+  constexpr double kFewestStop = 2, kMostStop = 1e12;
+  return number >= 1 ? static_cast<uint64_t>(std::clamp(number, kFewestStop, kMostStop)) : 0;
 }
 
 std::unique_ptr<Method> make_curves() { return std::make_unique<Curves>(); }
