@@ -5,7 +5,7 @@
 function(braid_test_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;BOXES" ${ARGN})
   add_executable(${name} tests/main.cpp ${ARG_SOURCES})
-  target_link_libraries(${name} PRIVATE ${ARG_BOXES} braid_flags braid_fewer_checks doctest::doctest)
+  target_link_libraries(${name} PRIVATE ${ARG_BOXES} braid_linked_images braid_flags braid_fewer_checks doctest::doctest)
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-Og>)  # what they test is not in these files
   # An assertion as one call: a quarter less to compile.
   target_compile_definitions(${name} PRIVATE DOCTEST_CONFIG_SUPER_FAST_ASSERTS BRAID_SOURCE_DIR="${CMAKE_SOURCE_DIR}" BRAID_BINARY="$<TARGET_FILE:braid>")
@@ -19,6 +19,9 @@ function(braid_test_program name)
   endif()
 endfunction()
 set_source_files_properties(tests/main.cpp PROPERTIES SKIP_PRECOMPILE_HEADERS ON)  # it implements doctest
+if(TARGET braid_image_module)
+  set_source_files_properties(tests/tools/test_image_module.cpp PROPERTIES COMPILE_DEFINITIONS BRAID_IMAGE_MODULE="$<TARGET_FILE:braid_image_module>")
+endif()
 set_source_files_properties(tests/main.cpp tests/support/counted_memory.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 
 # What also runs under sanitizers, where long statistics would take too long; nothing else is built there. What reads

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "renderer/film/film.h"
+#include "renderer/images/attribute.h"
 
 namespace braid {
 
@@ -67,16 +68,6 @@ struct Features {
   FeaturePlanes<Plane<float>> depth, visibility;
 };
 
-// Metadata written to the EXR header: name and value, in this order.
-struct Attribute {
-  std::string name;
-  enum class Kind { String, Int, Float, Matrix, Chromaticities } kind = Kind::String;
-  std::string text;
-  int64_t integer = 0;
-  double number = 0;
-  std::vector<float> values;  // Matrix: 16, row-major as OpenImageIO wants it; Chromaticities: 8
-};
-
 // Of which image the estimates are.
 struct EstimatesHead {
   int width = 0, height = 0;  // of the planes: the window
@@ -88,7 +79,7 @@ struct EstimatesHead {
 struct Estimates : EstimatesHead {
   std::vector<Estimate> estimates;
   std::optional<Features> features;
-  std::vector<Attribute> attributes;
+  std::vector<Attribute> attributes;  // of the EXR header, in this order
   // By name of the estimate: its earlier states at rounds 1, 2, 4, …, oldest first; none unless asked for.
   std::map<std::string, std::vector<Checkpoint>> history;
   // The image that all of them estimate, where it is known: for methods that show how good a choice could be.

@@ -13,6 +13,7 @@
 #include "renderer/core/error.h"
 #include "renderer/core/stopwatch.h"
 #include "renderer/film/files/output_file.h"
+#include "renderer/images/open_images.h"
 #include "tools/options/cli.h"
 #include "tools/options/combining.h"
 #include "tools/options/file_uses.h"
@@ -154,6 +155,7 @@ int runPreview(PreviewOptions o) {
   // inherit this.
   setpriority(PRIO_PROCESS, 0, 5);
 
+  std::future<void> images = openImages();
   SceneData data = loadScene(o.scene);
   const CameraData camera = chooseCamera(data, o.scene);
   const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
@@ -171,6 +173,7 @@ int runPreview(PreviewOptions o) {
   if (!session.plan().unreachable.empty()) audience.warn(session.plan().unreachable);
   audience.board().setPhase(PreviewPhase::Rendering);
 
+  if (!o.image.files().empty()) images.get();
   ProgressLine line(o.scene.quiet);
   RunReport result;
   {

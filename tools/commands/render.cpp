@@ -10,6 +10,7 @@
 #include "renderer/core/hash.h"
 #include "renderer/film/files/output_file.h"
 #include "renderer/film/files/state_file.h"
+#include "renderer/images/open_images.h"
 #include "tools/options/cli.h"
 #include "tools/options/combining.h"
 #include "tools/options/file_uses.h"
@@ -263,6 +264,7 @@ int runRender(RenderOptions o) {
   const double saveEvery = parseDuration(o.saveEvery);
   JsonLog json(o.logJson);
   const std::atomic<bool>& interrupted = installInterruptHandler();
+  std::future<void> images = openImages();
   std::optional<FilmState> earlier = earlierState(o, settings);
   if (earlier) keepAsBefore(*earlier, settings);
 
@@ -294,6 +296,8 @@ int runRender(RenderOptions o) {
   if (earlier) session.resume(std::move(*earlier), resumedFile(o));
   earlier.reset();
 
+  // What cannot be written must not be rendered.
+  if (!o.image.files().empty()) images.get();
   ProgressLine line(o.scene.quiet);
   const TimeLimit limit(settings.seconds);
   Publisher publisher({viewer.with(o.image), o.checkpoint, saveEvery, o.error, settings.spp == 0 && !limit.exists(),

@@ -11,6 +11,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
+#include "renderer/images/image_codecs.h"
 
 namespace braid {
 
@@ -48,6 +49,8 @@ uint64_t parseBytes(const std::string& text) {
 }
 
 void limitMemory(uint64_t bytes) {
+  // What reads and writes images must not be without the memory that it needs to be opened.
+  imageCodecs();
   // Threads that cannot get their stacks end the process; so all of them start before.
   parallelFor(static_cast<size_t>(machineThreads()) * 16, [](size_t) {});
   rlimit limit{};

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include <OpenImageIO/half.h>
+#include <half.h>
 #include <unistd.h>
 
 #include "tools/publish/estimated_error.h"

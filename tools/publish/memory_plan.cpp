@@ -18,7 +18,7 @@ namespace braid {
 namespace {
 
 constexpr double kMebibyte = 1048576.0;
-constexpr uint64_t kProgram = uint64_t(140) << 20;  // code and data of braid and the libraries that it starts with
+constexpr uint64_t kProgram = uint64_t(140) << 20;  // code and data of braid and the libraries that it opens
 
 // OpenEXR holds a few copies of the rows that it compresses.
 uint64_t writingBytes(const Plan& plan, const AvailableEstimates& available) {

@@ -14,6 +14,7 @@
 #include "integrators/registry.h"
 #include "renderer/core/error.h"
 #include "renderer/film/files/exr.h"
+#include "renderer/images/image_codecs.h"
 #include "tools/options/cli.h"
 #include "tools/options/file_uses.h"
 #include "tools/run/interrupt.h"
@@ -475,6 +476,7 @@ bool Sweep::reportFailures() const {
 int Sweep::run(std::ostream& out) {
   checkInputs();
   checkOutputs();
+  imageCodecs();  // what cannot be written must not be rendered
   openFolder();
   expectWork();
   bool completed = true;

@@ -7,17 +7,16 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
-#include <limits>
 #include <utility>
 #include <vector>
 
-#include <OpenImageIO/half.h>
-#include <OpenImageIO/imageio.h>
+#include <half.h>
 
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 #include "renderer/film/files/exr_rows.h"
 #include "renderer/film/files/output_file.h"
+#include "renderer/images/image_codecs.h"
 
 namespace braid {
 
@@ -136,64 +135,54 @@ std::vector<ExrChannel> namedPlanes(const Estimates& estimates, const Rgb<float>
 
 namespace {
 
-void addAttribute(OIIO::ImageSpec& spec, const Attribute& a) {
-  using OIIO::TypeDesc;
-  switch (a.kind) {
-    case Attribute::Kind::String:
-      spec.attribute(a.name, a.text);
-      break;
-    case Attribute::Kind::Int:
-      // EXR integers have 32 bits; a larger one (a seed, a count of samples) is kept exactly, as text.
-      if (a.integer >= std::numeric_limits<int>::min() && a.integer <= std::numeric_limits<int>::max())
-        spec.attribute(a.name, static_cast<int>(a.integer));
-      else
-        spec.attribute(a.name, std::to_string(a.integer));
-      break;
-    case Attribute::Kind::Float:
-      spec.attribute(a.name, static_cast<float>(a.number));
-      break;
-    case Attribute::Kind::Matrix:
-      BRAID_ASSERT(a.values.size() == 16);
-      spec.attribute(a.name, TypeDesc::TypeMatrix, a.values.data());
-      break;
-    case Attribute::Kind::Chromaticities:
-      BRAID_ASSERT(a.values.size() == 8);
-      spec.attribute(a.name, TypeDesc(TypeDesc::FLOAT, 8), a.values.data());
-      break;
-  }
-}
+Attribute text(const char* name, const char* value) { return {name, Attribute::Kind::String, value, 0, 0, {}}; }
 
-OIIO::ImageSpec makeSpec(const Estimates& estimates, const std::vector<ExrChannel>& channels) {
-  using OIIO::TypeDesc;
-  const int width = channels[0].plane->width, height = channels[0].plane->height;
-  OIIO::ImageSpec spec(width, height, static_cast<int>(channels.size()), TypeDesc::FLOAT);
-  spec.channelnames.clear();
-  for (const ExrChannel& c : channels) {
-    spec.channelnames.push_back(c.name);
-    spec.channelformats.push_back(c.half ? TypeDesc::HALF : TypeDesc::FLOAT);
-    if (c.name == "A") spec.alpha_channel = static_cast<int>(spec.channelnames.size()) - 1;
-  }
-  if (estimates.window.width() > 0) {
-    BRAID_ASSERT(estimates.window.width() == width && estimates.window.height() == height);
-    spec.x = estimates.window.x0;
-    spec.y = estimates.window.y0;
-  }
-  spec.full_width = estimates.fullWidth > 0 ? estimates.fullWidth : width;
-  spec.full_height = estimates.fullHeight > 0 ? estimates.fullHeight : height;
-
-  spec.attribute("compression", "zip:1");
+std::vector<Attribute> attributesOf(const Estimates& estimates) {
+  std::vector<Attribute> list{text("compression", "zip:1")};
   // OpenImageIO adds the date of writing when there is none; files must reproduce byte for byte, and an empty date is
   // the way to have none.
-  spec.attribute("DateTime", "");
-  const float rec709[8] = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};  // R, G, B, white D65: x, y
-  spec.attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), rec709);
-  spec.attribute("colorInteropID", "lin_rec709_scene");
-  spec.attribute("braid/varianceIs", "variance of the pixel mean");
-  for (const Attribute& a : estimates.attributes) addAttribute(spec, a);
-  return spec;
+  list.push_back(text("DateTime", ""));
+  // R, G, B, white D65: x, y
+  const std::vector<float> rec709 = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
+  list.push_back({"chromaticities", Attribute::Kind::Chromaticities, "", 0, 0, rec709});
+  list.push_back(text("colorInteropID", "lin_rec709_scene"));
+  list.push_back(text("braid/varianceIs", "variance of the pixel mean"));
+  for (const Attribute& a : estimates.attributes) {
+    BRAID_ASSERT(a.kind != Attribute::Kind::Matrix || a.values.size() == 16);
+    BRAID_ASSERT(a.kind != Attribute::Kind::Chromaticities || a.values.size() == 8);
+    list.push_back(a);
+  }
+  return list;
+}
+
+ImageHeader makeHeader(const Estimates& estimates, const std::vector<ExrChannel>& channels) {
+  ImageHeader header;
+  header.width = channels[0].plane->width;
+  header.height = channels[0].plane->height;
+  header.type = SampleType::Float;
+  for (const ExrChannel& c : channels) {
+    header.channels.push_back(c.name);
+    header.channelTypes.push_back(c.half ? SampleType::Half : SampleType::Float);
+    if (c.name == "A") header.alpha = static_cast<int>(header.channels.size()) - 1;
+  }
+  if (estimates.window.width() > 0) {
+    BRAID_ASSERT(estimates.window.width() == header.width && estimates.window.height() == header.height);
+    header.x = estimates.window.x0;
+    header.y = estimates.window.y0;
+  }
+  header.fullWidth = estimates.fullWidth;
+  header.fullHeight = estimates.fullHeight;
+  header.attributes = attributesOf(estimates);
+  return header;
 }
 
 size_t bytesOf(const ExrChannel& channel) { return channel.half ? sizeof(half) : sizeof(float); }
+
+size_t pixelBytes(const std::vector<ExrChannel>& channels) {
+  size_t bytes = 0;
+  for (const ExrChannel& c : channels) bytes += bytesOf(c);
+  return bytes;
+}
 
 // Copies a row of a plane to every `stride`-th byte; returns how many values had to be clamped to the range of half
 // floats.
@@ -218,8 +207,7 @@ uint64_t interleaveRow(const ExrChannel& channel, int y, size_t stride, std::byt
 // convert it copies value by value, on one thread. Returns how many values had to be clamped.
 uint64_t interleave(const std::vector<ExrChannel>& channels, int begin, int end, std::vector<std::byte>& out) {
   std::atomic<uint64_t> clamped{0};
-  size_t stride = 0;
-  for (const ExrChannel& c : channels) stride += bytesOf(c);
+  const size_t stride = pixelBytes(channels);
   const size_t rowBytes = stride * static_cast<size_t>(channels[0].plane->width);
   parallelRows(end - begin, [&](int row) {
     uint64_t clampedInRow = 0;
@@ -239,24 +227,24 @@ WriteReport writeExr(const std::string& path, const Estimates& estimates, const 
                      const Plane<float>* alpha, const ExrOptions& options) {
   BRAID_ASSERT(!headline.empty());
   const std::vector<ExrChannel> channels = namedPlanes(estimates, headline, alpha, options);
-  const OIIO::ImageSpec spec = makeSpec(estimates, channels);
+  const ImageHeader header = makeHeader(estimates, channels);
 
+  const ImageCodecs& codecs = imageCodecs();
   OutputFile file(path, ".exr");
   WriteReport report;
+  std::string error;
   {
-    const auto out = OIIO::ImageOutput::create("exr");
-    if (!out) file.fail(OIIO::geterror());
-    if (!out->set_ioproxy(&file)) file.fail("this OpenImageIO cannot write EXR through a stream");
-    if (!out->open(file.temporaryPath(), spec)) file.fail(out->geterror());
-    const int rowsAtOnce = std::min(spec.height, exrRowsPerWrite());
-    std::vector<std::byte> rows(static_cast<size_t>(rowsAtOnce) * spec.scanline_bytes(true));
-    for (int y = 0; y < spec.height; y += rowsAtOnce) {
-      const int end = std::min(spec.height, y + rowsAtOnce);
+    const auto out = codecs.create("exr", file.temporaryPath(), header, file, error);
+    if (!out) file.fail(error);
+    const int rowsAtOnce = std::min(header.height, exrRowsPerWrite());
+    std::vector<std::byte> rows(static_cast<size_t>(rowsAtOnce) * static_cast<size_t>(header.width) *
+                                pixelBytes(channels));
+    for (int y = 0; y < header.height; y += rowsAtOnce) {
+      const int end = std::min(header.height, y + rowsAtOnce);
       report.clampedToHalf += interleave(channels, y, end, rows);
-      if (!out->write_scanlines(spec.y + y, spec.y + end, 0, OIIO::TypeDesc::UNKNOWN, rows.data()))
-        file.fail(out->geterror());
+      if (!out->writeRows(y, end, rows.data())) file.fail(out->takeError());
     }
-    if (!out->close()) file.fail(out->geterror());
+    if (!out->close()) file.fail(out->takeError());
   }
   file.finish();
   return report;

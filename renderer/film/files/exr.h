@@ -54,7 +54,7 @@ struct WriteReport {
 WriteReport writeExr(const std::string& path, const Estimates& estimates, const Rgb<float>& headline,
                      const Plane<float>* alpha, const ExrOptions& options);
 
-// Any image file OpenImageIO reads: planes by channel name, in float and linear (integer formats are decoded from
+// Any image file that OpenImageIO reads: planes by channel name, in float and linear (integer formats are decoded from
 // sRGB). The parts of a multi-part EXR are merged: a channel name that repeats gets the part's name as a prefix. Throws
 // Error(BadInput).
 struct ImageFile {

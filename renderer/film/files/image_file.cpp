@@ -8,14 +8,13 @@
 #include <system_error>
 #include <vector>
 
-#include <OpenImageIO/imageio.h>
-
 #include "renderer/core/error.h"
 #include "renderer/core/image_limits.h"
 #include "renderer/core/parallel.h"
 #include "renderer/core/plane.h"
 #include "renderer/film/files/exr.h"
 #include "renderer/film/files/srgb.h"
+#include "renderer/images/image_codecs.h"
 
 namespace braid {
 
@@ -34,71 +33,46 @@ constexpr int kRowsPerRead = 64;
   throw Error(ExitCode::BadInput, path + ": " + line);
 }
 
-void checkSize(const std::string& path, uint64_t fileBytes, const OIIO::ImageSpec& spec) {
-  const std::string size = std::to_string(spec.width) + "x" + std::to_string(spec.height);
-  if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0) refuse(path, "empty image (" + size + ")");
-  if (spec.deep) refuse(path, "deep images are not supported; flatten it first (oiiotool --flatten)");
-  if (spec.depth > 1) refuse(path, "volume images are not supported");
-  const int64_t pixels = int64_t(spec.width) * spec.height;
+void checkSize(const std::string& path, uint64_t fileBytes, const ImageHeader& header) {
+  const auto channels = static_cast<int64_t>(header.channels.size());
+  const std::string size = std::to_string(header.width) + "x" + std::to_string(header.height);
+  if (header.width <= 0 || header.height <= 0 || channels <= 0) refuse(path, "empty image (" + size + ")");
+  if (header.deep) refuse(path, "deep images are not supported; flatten it first (oiiotool --flatten)");
+  if (header.depth > 1) refuse(path, "volume images are not supported");
+  const int64_t pixels = int64_t(header.width) * header.height;
   if (pixels > kMaxPixels) refuse(path, size + " pixels are more than the limit of 2^28; crop or resize it");
-  if (spec.nchannels > kMaxChannels || pixels * spec.nchannels > kMaxValues)
-    refuse(path, size + " pixels with " + std::to_string(spec.nchannels) +
+  if (channels > kMaxChannels || pixels * channels > kMaxValues)
+    refuse(path, size + " pixels with " + std::to_string(channels) +
                      " channels are more than the limit (4096 channels, 2^32 values); remove some channels");
-  if (!canHold(fileBytes, static_cast<uint64_t>(pixels * spec.nchannels)))
+  if (!canHold(fileBytes, static_cast<uint64_t>(pixels * channels)))
     refuse(path, "claims " + size + " pixels in " + std::to_string(fileBytes) +
                      " bytes, which cannot be: it is damaged; use another copy");
 }
 
-// 8- and 16-bit formats hold sRGB unless they say otherwise; float formats are linear.
-bool holdsSrgb(const OIIO::ImageSpec& spec) {
-  const auto base = spec.format.basetype;
-  if (base == OIIO::TypeDesc::HALF || base == OIIO::TypeDesc::FLOAT || base == OIIO::TypeDesc::DOUBLE) return false;
-  const std::string space(spec.get_string_attribute("oiio:ColorSpace", "sRGB"));
-  return !OIIO::Strutil::istarts_with(space, "lin") && space != "scene_linear";
+bool startsLinear(const std::string& space) {
+  constexpr const char* kLinear = "lin";
+  for (size_t i = 0; i < 3; ++i)
+    if (i >= space.size() || (space[i] | 0x20) != kLinear[i]) return false;
+  return true;
 }
 
-Attribute toAttribute(const OIIO::ParamValue& p) {
-  using OIIO::TypeDesc;
-  Attribute a;
-  a.name = p.name().string();
-  const TypeDesc type = p.type();
-  const auto floats = [&p](size_t count) {
-    const auto* f = static_cast<const float*>(p.data());
-    return std::vector<float>(f, f + count);
-  };
-  if (type == TypeDesc::TypeMatrix) {
-    a.kind = Attribute::Kind::Matrix;
-    a.values = floats(16);
-  } else if (type == TypeDesc(TypeDesc::FLOAT, 8)) {
-    a.kind = Attribute::Kind::Chromaticities;
-    a.values = floats(8);
-  } else if (type == TypeDesc::TypeInt) {
-    a.kind = Attribute::Kind::Int;
-    a.integer = p.get_int();
-  } else if (type == TypeDesc::TypeFloat) {
-    a.kind = Attribute::Kind::Float;
-    a.number = static_cast<double>(p.get_float());
-  } else {
-    a.text = p.get_string();
-  }
-  return a;
+// 8- and 16-bit formats hold sRGB unless they say otherwise; float formats are linear.
+bool holdsSrgb(const ImageHeader& header) {
+  if (isFloatingPoint(header.type)) return false;
+  return !startsLinear(header.colourSpace) && header.colourSpace != "scene_linear";
 }
 
 // Reads one part, some rows at a time: never the whole file twice in memory.
-void readPart(const std::string& path, OIIO::ImageInput& in, int part, std::vector<Plane<float>>& planes) {
-  const OIIO::ImageSpec spec = in.spec(part);
-  const auto count = static_cast<size_t>(spec.nchannels), width = static_cast<size_t>(spec.width);
-  const int step = spec.tile_height > 0 ? spec.tile_height : kRowsPerRead;
-  std::vector<float> rows(static_cast<size_t>(std::min(step, spec.height)) * width * count);
-  for (int y = 0; y < spec.height; y += step) {
-    const int begin = spec.y + y, end = std::min(begin + step, spec.y + spec.height);
-    const bool ok =
-        spec.tile_width > 0
-            ? in.read_tiles(part, 0, spec.x, spec.x + spec.width, begin, end, spec.z, spec.z + 1, 0, spec.nchannels,
-                            OIIO::TypeDesc::FLOAT, rows.data())
-            : in.read_scanlines(part, 0, begin, end, spec.z, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, rows.data());
-    if (!ok) refuse(path, "cannot be read: " + in.geterror() + "; the file is damaged or incomplete");
-    parallelRows(end - begin, [&](int row) {
+void readPart(const std::string& path, ImageReader& in, std::vector<Plane<float>>& planes) {
+  const ImageHeader& header = in.header();
+  const size_t count = header.channels.size(), width = static_cast<size_t>(header.width);
+  const int step = header.tileHeight > 0 ? header.tileHeight : kRowsPerRead;
+  std::vector<float> rows(static_cast<size_t>(std::min(step, header.height)) * width * count);
+  for (int y = 0; y < header.height; y += step) {
+    const int end = std::min(y + step, header.height);
+    if (!in.readRows(y, end, rows.data()))
+      refuse(path, "cannot be read: " + in.takeError() + "; the file is damaged or incomplete");
+    parallelRows(end - y, [&](int row) {
       for (size_t c = 0; c < count; ++c) {
         const float* from = rows.data() + static_cast<size_t>(row) * width * count + c;
         float* to = &planes[c].at(0, y + row);
@@ -108,11 +82,15 @@ void readPart(const std::string& path, OIIO::ImageInput& in, int part, std::vect
   }
 }
 
+const Plane<float>* alphaOf(const ImageHeader& header, const std::vector<Plane<float>>& planes) {
+  const bool exists = header.alpha >= 0 && static_cast<size_t>(header.alpha) < planes.size();
+  return exists ? &planes[static_cast<size_t>(header.alpha)] : nullptr;
+}
+
 // Colours to linear, premultiplied by alpha as everything else here is. `multiplied`: alpha is in the encoded colours
 // already, where it does not belong.
-void linearise(const OIIO::ImageSpec& spec, bool multiplied, std::vector<Plane<float>>& planes) {
-  const bool hasAlpha = spec.alpha_channel >= 0 && spec.alpha_channel < spec.nchannels;
-  const Plane<float>* alpha = hasAlpha ? &planes[static_cast<size_t>(spec.alpha_channel)] : nullptr;
+void linearise(const ImageHeader& header, bool multiplied, std::vector<Plane<float>>& planes) {
+  const Plane<float>* alpha = alphaOf(header, planes);
   for (Plane<float>& p : planes) {
     if (&p == alpha) continue;
     parallelChunks(p.size(), kPixelChunk, [&](size_t begin, size_t end) {
@@ -125,52 +103,51 @@ void linearise(const OIIO::ImageSpec& spec, bool multiplied, std::vector<Plane<f
 }
 
 // Linear colours that alpha is not in yet.
-void premultiply(const OIIO::ImageSpec& spec, std::vector<Plane<float>>& planes) {
-  if (spec.alpha_channel < 0 || spec.alpha_channel >= spec.nchannels) return;
-  const Plane<float>& alpha = planes[static_cast<size_t>(spec.alpha_channel)];
+void premultiply(const ImageHeader& header, std::vector<Plane<float>>& planes) {
+  const Plane<float>* alpha = alphaOf(header, planes);
+  if (!alpha) return;
   for (Plane<float>& p : planes)
-    if (&p != &alpha)
-      for (size_t i = 0; i < p.size(); ++i) p[i] *= alpha[i];
+    if (&p != alpha)
+      for (size_t i = 0; i < p.size(); ++i) p[i] *= (*alpha)[i];
 }
 
-void addPart(ImageFile& file, OIIO::ImageInput& in, int part) {
-  const OIIO::ImageSpec spec = in.spec(part);
-  if (part > 0 && (spec.width != file.width || spec.height != file.height)) return;  // a thumbnail or a mip level
-  std::vector<Plane<float>> planes(static_cast<size_t>(spec.nchannels), Plane<float>(spec.width, spec.height));
-  readPart(file.path, in, part, planes);
+void addPart(ImageFile& file, ImageReader& in, int part) {
+  const ImageHeader& header = in.header();
+  if (part > 0 && (header.width != file.width || header.height != file.height)) return;  // a thumbnail or a mip level
+  std::vector<Plane<float>> planes(header.channels.size(), Plane<float>(header.width, header.height));
+  readPart(file.path, in, planes);
   // OpenImageIO's WebP reader multiplies whatever it is asked for.
-  if (holdsSrgb(spec))
-    linearise(spec, std::string_view(in.format_name()) == "webp", planes);
-  else if (spec.get_int_attribute("oiio:UnassociatedAlpha") != 0)
-    premultiply(spec, planes);
-  const std::string partName = spec.get_string_attribute("oiio:subimagename", "part" + std::to_string(part));
-  for (int c = 0; c < spec.nchannels; ++c) {
-    std::string name = spec.channel_name(c);
+  if (holdsSrgb(header))
+    linearise(header, in.format() == "webp", planes);
+  else if (header.unassociatedAlpha)
+    premultiply(header, planes);
+  const std::string partName = header.part.empty() ? "part" + std::to_string(part) : header.part;
+  for (size_t c = 0; c < planes.size(); ++c) {
+    std::string name = header.channels[c];
     if (file.planes.count(name)) name = partName + "." + name;
     if (file.planes.count(name)) continue;
     file.channelNames.push_back(name);
-    file.planes.emplace(name, std::move(planes[static_cast<size_t>(c)]));
+    file.planes.emplace(name, std::move(planes[c]));
   }
 }
 
-ImageFile readOpened(const std::string& path, uint64_t fileBytes, OIIO::ImageInput& in) {
-  const OIIO::ImageSpec first = in.spec();
+ImageFile readOpened(const std::string& path, uint64_t fileBytes, ImageReader& in) {
+  const ImageHeader& header = in.header();
   ImageFile file;
   file.path = path;
-  file.width = first.width;
-  file.height = first.height;
-  file.window = {first.x, first.y, first.x + first.width, first.y + first.height};
-  file.fullWidth = first.full_width;
-  file.fullHeight = first.full_height;
-  for (const OIIO::ParamValue& p : first.extra_attribs) file.attributes.push_back(toAttribute(p));
+  file.width = header.width;
+  file.height = header.height;
+  file.window = {header.x, header.y, header.x + header.width, header.y + header.height};
+  file.fullWidth = header.fullWidth;
+  file.fullHeight = header.fullHeight;
+  file.attributes = header.attributes;
   int64_t values = 0;
-  for (int part = 0; in.seek_subimage(part, 0); ++part) {
-    checkSize(path, fileBytes, in.spec());
-    values += int64_t(in.spec().width) * in.spec().height * in.spec().nchannels;
+  for (int part = 0; in.select(part); ++part) {
+    checkSize(path, fileBytes, header);
+    values += int64_t(header.width) * header.height * static_cast<int64_t>(header.channels.size());
     if (values > kMaxValues) refuse(path, "its parts hold more than the limit of 2^32 values; remove some");
     addPart(file, in, part);
   }
-  in.geterror();  // the seek past the last part
   return file;
 }
 
@@ -214,12 +191,11 @@ ImageFile readImage(const std::string& path) {
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored)) refuse(path, "no such file");
   if (std::filesystem::is_directory(path, ignored)) refuse(path, "is a folder, not an image");
-  OIIO::ImageSpec hints;
-  hints.attribute("oiio:UnassociatedAlpha", 1);  // sRGB has to be decoded before colours are multiplied by alpha
-  const auto in = OIIO::ImageInput::open(path, &hints);
-  if (!in) refuse(path, "cannot be read as an image: " + OIIO::geterror());
+  std::string error;
+  const auto in = imageCodecs().open(path, error);
+  if (!in) refuse(path, "cannot be read as an image: " + error);
   const uint64_t fileBytes = std::filesystem::file_size(path, ignored);
-  checkSize(path, fileBytes, in->spec());
+  checkSize(path, fileBytes, in->header());
   try {
     return readOpened(path, fileBytes, *in);
   } catch (const std::bad_alloc&) {

@@ -106,8 +106,7 @@ void removeAbandoned(const std::string& path) {
 }
 
 OutputFile::OutputFile(const std::string& path, const std::string& extension)
-    : IOProxy(path, IOProxy::Write),
-      path_(path),
+    : path_(path),
       stream_(isStream(path)),
       target_(stream_ ? path : behindLinks(path)),
       temporary_(stream_ ? "stream" + extension : target_ + ".tmp-" + std::to_string(::getpid()) + extension) {
@@ -190,14 +189,6 @@ size_t OutputFile::write(const void* data, size_t size) {
   return written;
 }
 
-size_t OutputFile::pwrite(const void* data, size_t size, int64_t offset) {
-  const int64_t here = position_;
-  if (!seek(offset)) return 0;
-  const size_t written = write(data, size);
-  seek(here);
-  return written;
-}
-
 bool OutputFile::seek(int64_t offset) {
   if (offset == position_) return true;
   errno = 0;
@@ -206,7 +197,5 @@ bool OutputFile::seek(int64_t offset) {
   if (ok) position_ = offset;
   return ok;
 }
-
-int64_t OutputFile::tell() { return position_; }
 
 }  // namespace braid

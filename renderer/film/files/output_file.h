@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <string>
 
-#include <OpenImageIO/filesystem.h>
+#include "renderer/images/byte_sink.h"
 
 namespace braid {
 
@@ -22,9 +22,9 @@ std::string behindLinks(const std::string& path);
 
 // Writes to "path.tmp-PID.EXT" in the same folder; finish() waits for the disk and renames it to `path`, or to what
 // `path` is a symbolic link to. Without finish() the temporary file is removed and a previous file stays intact.
-// Streams get everything in finish(). OpenImageIO's writers do not check every write, so the first failure is
+// Streams get everything in finish(). Writers of images do not check every write, so the first failure is
 // remembered here and reported by finish(), a full disk included.
-class OutputFile : public OIIO::Filesystem::IOProxy {
+class OutputFile : public ByteSink {
  public:
   // `extension` with its dot. Throws Error(OutputFailed).
   OutputFile(const std::string& path, const std::string& extension);
@@ -37,13 +37,10 @@ class OutputFile : public OIIO::Filesystem::IOProxy {
   [[noreturn]] void fail(const std::string& reason) const;
   const std::string& temporaryPath() const { return temporary_; }
 
-  const char* proxytype() const override { return "braid"; }
   size_t write(const void* data, size_t size) override;
-  size_t pwrite(const void* data, size_t size, int64_t offset) override;
   bool seek(int64_t offset) override;
-  int64_t tell() override;
+  int64_t tell() const override { return position_; }
   size_t size() const override { return static_cast<size_t>(size_); }
-  void flush() const override {}
 
  private:
   void note(bool ok);

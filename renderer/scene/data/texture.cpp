@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <system_error>
 
 #include "renderer/core/error.h"
 #include "renderer/core/image_limits.h"
+#include "renderer/images/image_codecs.h"
 #include "renderer/scene/data/webp.h"
 
 namespace braid {
@@ -129,48 +131,25 @@ std::string formatName(const uint8_t* data, size_t bytes) {
   throw Error(ExitCode::BadInput, "is not an image of a known format; save it as PNG or JPEG");
 }
 
-using InputPointer = std::unique_ptr<OIIO::ImageInput>;
-
-// OpenImageIO's reader copies from beyond the end of the memory when a file sends it there.
-class BoundedReader : public OIIO::Filesystem::IOMemReader {
- public:
-  using IOMemReader::IOMemReader;
-  size_t read(void* to, size_t most) override {
-    const size_t count = pread(to, most, m_pos);
-    m_pos += static_cast<int64_t>(count);
-    return count;
-  }
-  size_t pread(void* to, size_t most, int64_t offset) override {
-    if (offset < 0 || static_cast<uint64_t>(offset) >= size()) return 0;
-    const size_t at = static_cast<size_t>(offset), count = std::min(most, size() - at);
-    std::memcpy(to, m_buf.data() + at, count);
-    return count;
-  }
-};
-
-InputPointer openInput(const std::string& name, OIIO::Filesystem::IOProxy* proxy) {
-  OIIO::ImageSpec config;
-  // Alpha is coverage in glTF: colours must not be multiplied by it.
-  config.attribute("oiio:UnassociatedAlpha", 1);
-  InputPointer input = OIIO::ImageInput::create(name, false, &config, proxy);
-  const bool canProxy = input && (!proxy || input->supports("ioproxy"));
-  OIIO::ImageSpec spec;
-  if (canProxy && proxy) input->set_ioproxy(proxy);
-  if (canProxy && input->open(name, spec, config)) return input;
-  const std::string reason = canProxy ? oneLine(input->geterror()) : "no such format; " + oneLine(OIIO::geterror());
-  throw Error(ExitCode::BadInput, "is not an image that can be read (" + reason + "); save it as PNG or JPEG");
+// `data` null: from the file of this name.
+std::unique_ptr<ImageReader> openReader(const std::string& name, const uint8_t* data, size_t bytes) {
+  std::string error;
+  std::unique_ptr<ImageReader> reader = imageCodecs().openNamed(name, data, bytes, error);
+  if (reader) return reader;
+  throw Error(ExitCode::BadInput, "is not an image that can be read (" + oneLine(error) + "); save it as PNG or JPEG");
 }
 
-int keptChannels(const OIIO::ImageSpec& spec) {
-  if (spec.nchannels >= 4) return spec.alpha_channel == 3 ? 4 : 3;
-  if (spec.nchannels == 2) return spec.alpha_channel == 1 ? 2 : 1;
-  return spec.nchannels;
+int keptChannels(const ImageHeader& header) {
+  const auto channels = static_cast<int>(header.channels.size());
+  if (channels >= 4) return header.alpha == 3 ? 4 : 3;
+  if (channels == 2) return header.alpha == 1 ? 2 : 1;
+  return channels;
 }
 
 // Formats whose alpha is associated by their rules, unless the reader says otherwise.
-bool isAssociated(const OIIO::ImageInput& input) {
-  const std::string format = input.format_name();
-  return (format == "openexr" || format == "tiff") && input.spec().get_int_attribute("oiio:UnassociatedAlpha") == 0;
+bool isAssociated(const ImageReader& reader) {
+  const std::string format = reader.format();
+  return (format == "openexr" || format == "tiff") && !reader.header().unassociatedAlpha;
 }
 
 void divideByAlpha(Image& image) {
@@ -187,30 +166,29 @@ void divideByAlpha(Image& image) {
   }
 }
 
-std::shared_ptr<Image> readPixels(OIIO::ImageInput& input, const std::string& name, uint64_t fileBytes) {
-  const OIIO::ImageSpec spec = input.spec();
-  if (spec.depth > 1) throw Error(ExitCode::BadInput, "is an image of several layers; save it as a flat picture");
-  checkImageSize(spec.width, spec.height, spec.nchannels, fileBytes);
+std::shared_ptr<Image> readPixels(ImageReader& reader, const std::string& name, uint64_t fileBytes) {
+  const ImageHeader& header = reader.header();
+  if (header.depth > 1) throw Error(ExitCode::BadInput, "is an image of several layers; save it as a flat picture");
+  checkImageSize(header.width, header.height, static_cast<int>(header.channels.size()), fileBytes);
   auto image = std::make_shared<Image>();
   image->name = name;
-  image->width = spec.width;
-  image->height = spec.height;
-  image->channels = keptChannels(spec);
+  image->width = header.width;
+  image->height = header.height;
+  image->channels = keptChannels(header);
   const size_t values =
-      static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height) * static_cast<size_t>(image->channels);
-  const bool isByte = spec.format == OIIO::TypeDesc::UINT8;
+      static_cast<size_t>(header.width) * static_cast<size_t>(header.height) * static_cast<size_t>(image->channels);
+  const bool isByte = header.type == SampleType::Byte;
   void* out = nullptr;
   if (isByte) {
     image->bytes.resize(values);
     out = image->bytes.data();
   } else {
     image->floats.resize(values);
-    image->integerFloats = !spec.format.is_floating_point();
+    image->integerFloats = !isFloatingPoint(header.type);
     out = image->floats.data();
   }
-  if (!input.read_image(0, 0, 0, image->channels, isByte ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT, out)) {
-    throw Error(ExitCode::BadInput, "is a broken image (" + oneLine(input.geterror()) + "); save it again");
-  }
+  if (!reader.readImage(image->channels, isByte ? SampleType::Byte : SampleType::Float, out))
+    throw Error(ExitCode::BadInput, "is a broken image (" + oneLine(reader.takeError()) + "); save it again");
   for (float& v : image->floats) {
     const float meant = std::isfinite(v) ? std::clamp(v, 0.0f, kLargestRadiance) : 0.0f;
     image->limited += meant != v;
@@ -309,36 +287,37 @@ size_t Texture::bytes() const { return image_ ? image_->bytes.size() + image_->f
 std::shared_ptr<const Image> decodeImage(const uint8_t* data, size_t bytes, const std::string& name) {
   if (bytes == 0) throw Error(ExitCode::BadInput, "is an empty image; save it again");
   if (isWebp(data, bytes)) return decodeWebp(data, bytes, name);
-  const std::string format = formatName(data, bytes);
-  BoundedReader reader(data, bytes);
-  const InputPointer input = openInput(format, &reader);
-  const std::shared_ptr<Image> image = readPixels(*input, name, bytes);
-  if (image->hasAlpha() && isAssociated(*input)) divideByAlpha(*image);
+  const std::unique_ptr<ImageReader> reader = openReader(formatName(data, bytes), data, bytes);
+  const std::shared_ptr<Image> image = readPixels(*reader, name, bytes);
+  if (image->hasAlpha() && isAssociated(*reader)) divideByAlpha(*image);
   return image;
 }
 
 namespace {
 
 bool beginsAsWebp(const std::string& path) {
-  std::array<uint8_t, 12> first{};
-  return OIIO::Filesystem::read_bytes(path, first.data(), first.size()) == first.size() &&
-         isWebp(first.data(), first.size());
+  std::array<char, 12> first{};
+  std::ifstream in(path, std::ios::binary);
+  return in.read(first.data(), first.size()) && isWebp(reinterpret_cast<const uint8_t*>(first.data()), first.size());
 }
 
 }  // namespace
 
 std::shared_ptr<const Image> readImageFile(const std::string& path) {
-  if (!OIIO::Filesystem::is_regular(path))
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored))
     throw Error(ExitCode::BadInput, path + ": is not a file that can be read; check the path");
   try {
-    if (std::string file; beginsAsWebp(path)) {
-      if (!OIIO::Filesystem::read_text_file(path, file))
-        throw Error(ExitCode::BadInput, "cannot be read; check its permissions");
+    if (beginsAsWebp(path)) {
+      std::ifstream in(path, std::ios::binary);
+      const std::string file{std::istreambuf_iterator<char>(in), {}};
+      if (in.bad()) throw Error(ExitCode::BadInput, "cannot be read; check its permissions");
       return decodeWebp(reinterpret_cast<const uint8_t*>(file.data()), file.size(), path);
     }
-    const InputPointer input = openInput(path, nullptr);
-    return readPixels(*input, path, OIIO::Filesystem::file_size(path));
+    return readPixels(*openReader(path, nullptr, 0), path, std::filesystem::file_size(path, ignored));
   } catch (const Error& error) {
+    // That the codecs cannot be opened is no fault of the file.
+    if (error.code() != ExitCode::BadInput) throw;
     throw Error(error.code(), path + ": " + error.what());
   }
 }

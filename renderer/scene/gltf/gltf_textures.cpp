@@ -102,6 +102,8 @@ void decode(const Document& document, const ImageSource& source, PixelBudget& bu
     out.image = decodeImage(out.encoded.data(), out.encoded.size(), named ? source.uri : source.name);
     budget.add(out.image->bytes.size() + out.image->floats.size() * sizeof(float));
   } catch (const Error& error) {
+    // That the codecs cannot be opened is no fault of the image.
+    if (error.code() != ExitCode::BadInput) throw;
     out.problem = error.what();
   }
 }

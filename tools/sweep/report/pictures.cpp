@@ -4,11 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
-
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
+#include "renderer/images/image_codecs.h"
 #include "tools/metrics/tonemap.h"
 
 namespace braid {
@@ -72,17 +70,20 @@ Plane<T> croppedPlane(const Plane<T>& in, const PixelWindow& w) {
   return out;
 }
 
-std::string encode(const Picture& picture, const char* format) {
-  OIIO::ImageSpec spec(picture.width, picture.height, 3, OIIO::TypeDesc::UINT8);
-  spec.attribute("oiio:ColorSpace", "sRGB");
-  spec.attribute("Compression", "jpeg:88");
-  std::vector<unsigned char> bytes;
-  OIIO::Filesystem::IOVecOutput memory(bytes);
-  const auto out = OIIO::ImageOutput::create(format);
-  if (!out || !out->supports("ioproxy") || !out->set_ioproxy(&memory)) return {};
-  if (!out->open(std::string("picture.") + format, spec)) return {};
-  if (!out->write_image(OIIO::TypeDesc::UINT8, picture.rgb.data()) || !out->close()) return {};
-  return {bytes.begin(), bytes.end()};
+// Empty: it cannot be, and `error` says why.
+std::string encode(const Picture& picture, const char* format, std::string& error) {
+  ImageHeader header;
+  header.width = picture.width;
+  header.height = picture.height;
+  header.type = SampleType::Byte;
+  header.channels = {"R", "G", "B"};
+  header.attributes = {{"oiio:ColorSpace", Attribute::Kind::String, "sRGB", 0, 0, {}},
+                       {"Compression", Attribute::Kind::String, "jpeg:88", 0, 0, {}}};
+  MemorySink memory;
+  const auto out = imageCodecs().create(format, std::string("picture.") + format, header, memory, error);
+  if (out && out->writeImage(picture.rgb.data()) && out->close()) return memory.bytes();
+  if (out) error = out->takeError();
+  return {};
 }
 
 }  // namespace
@@ -173,12 +174,13 @@ std::string base64(const std::string& bytes) {
 }
 
 std::string dataUri(const Picture& picture) {
+  std::string error;
   if (static_cast<size_t>(picture.width) * static_cast<size_t>(picture.height) > kJpegPixels) {
-    const std::string jpeg = encode(picture, "jpg");
+    const std::string jpeg = encode(picture, "jpg", error);
     if (!jpeg.empty()) return "data:image/jpeg;base64," + base64(jpeg);
   }
-  const std::string png = encode(picture, "png");
-  if (png.empty()) throw Error(ExitCode::OutputFailed, "the report's pictures cannot be encoded: " + OIIO::geterror());
+  const std::string png = encode(picture, "png", error);
+  if (png.empty()) throw Error(ExitCode::OutputFailed, "the report's pictures cannot be encoded: " + error);
   return "data:image/png;base64," + base64(png);
 }
 
