@@ -34,8 +34,8 @@ const ImageCodecs& openModule() {
   const fs::path path = modulePath();
   std::error_code ignored;
   if (!fs::exists(path, ignored)) fail(path, "there is no such file");
-  // Bound as far as it is used: all symbols of its libraries would take a third longer.
-  void* module = ::dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);
+  // What is missing in its libraries shows now, not when hours have been rendered.
+  void* module = ::dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (!module) fail(path, ::dlerror());
   const auto entry = reinterpret_cast<ImageModuleEntry>(::dlsym(module, kImageModuleEntry));
   const ImageCodecs* codecs = entry ? entry(BRAID_IMAGE_MODULE_VERSION) : nullptr;

@@ -2,16 +2,23 @@
 // Opens the image codecs beside other work.
 #pragma once
 
+#include <chrono>
 #include <future>
 
 #include "renderer/images/image_codecs.h"
 
 namespace braid {
 
-// get() waits for it and throws what imageCodecs() throws; so does the destructor wait, as no program may end
-// meanwhile.
-inline std::future<void> openImages() {
-  return std::async(std::launch::async, [] { imageCodecs(); });
-}
+// The destructor waits: no program may end meanwhile.
+class OpeningImages {
+ public:
+  // Throws what imageCodecs() throws as soon as that is known: what cannot be written should not be rendered.
+  void check() {
+    if (opened_.valid() && opened_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) opened_.get();
+  }
+
+ private:
+  std::future<void> opened_ = std::async(std::launch::async, [] { imageCodecs(); });
+};
 
 }  // namespace braid

@@ -155,7 +155,7 @@ int runPreview(PreviewOptions o) {
   // inherit this.
   setpriority(PRIO_PROCESS, 0, 5);
 
-  std::future<void> images = openImages();
+  OpeningImages images;
   SceneData data = loadScene(o.scene);
   const CameraData camera = chooseCamera(data, o.scene);
   const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
@@ -173,7 +173,8 @@ int runPreview(PreviewOptions o) {
   if (!session.plan().unreachable.empty()) audience.warn(session.plan().unreachable);
   audience.board().setPhase(PreviewPhase::Rendering);
 
-  if (!o.image.files().empty()) images.get();
+  const bool writesImages = !o.image.files().empty();
+  if (writesImages) images.check();
   ProgressLine line(o.scene.quiet);
   RunReport result;
   {
@@ -188,6 +189,7 @@ int runPreview(PreviewOptions o) {
     result = session.advance(
         [&](const Progress& p) {
           feed.round(p);
+          if (writesImages) images.check();
           audience.board().progress(p);
           audience.passWarningsOn();
           line.update(p);

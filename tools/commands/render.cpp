@@ -264,7 +264,7 @@ int runRender(RenderOptions o) {
   const double saveEvery = parseDuration(o.saveEvery);
   JsonLog json(o.logJson);
   const std::atomic<bool>& interrupted = installInterruptHandler();
-  std::future<void> images = openImages();
+  OpeningImages images;
   std::optional<FilmState> earlier = earlierState(o, settings);
   if (earlier) keepAsBefore(*earlier, settings);
 
@@ -296,8 +296,8 @@ int runRender(RenderOptions o) {
   if (earlier) session.resume(std::move(*earlier), resumedFile(o));
   earlier.reset();
 
-  // What cannot be written must not be rendered.
-  if (!o.image.files().empty()) images.get();
+  const bool writesImages = !o.image.files().empty();
+  if (writesImages) images.check();
   ProgressLine line(o.scene.quiet);
   const TimeLimit limit(settings.seconds);
   Publisher publisher({viewer.with(o.image), o.checkpoint, saveEvery, o.error, settings.spp == 0 && !limit.exists(),
@@ -309,6 +309,7 @@ int runRender(RenderOptions o) {
   const RunReport result = session.advance(
       [&](const Progress& p) {
         late.over(json);
+        if (writesImages) images.check();
         std::vector<Publication> news = publisher.round(p);
         viewer.addFailure(news);
         tellNews(news, o, json);
