@@ -2,9 +2,6 @@
 #include "tools/images/estimates_file.h"
 
 #include <algorithm>
-#include <charconv>
-#include <set>
-#include <cstdlib>
 #include <filesystem>
 
 #include <fmt/format.h>
@@ -13,145 +10,13 @@
 #include "combiners/pipeline/spatial_variance.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
+#include "tools/images/braid_image.h"
 #include "tools/images/foreign_image.h"
 #include "tools/images/same_view.h"
 
 namespace braid {
 
 namespace {
-
-const char* toString(Correlation c) {
-  return c == Correlation::Independent ? "independent"
-         : c == Correlation::Gradients ? "gradients"
-                                       : "common random numbers";
-}
-
-const Attribute* find(const ImageFile& file, const std::string& name) {
-  for (const Attribute& a : file.attributes)
-    if (a.name == name) return &a;
-  return nullptr;
-}
-
-// Integers beyond 32 bits are kept as text.
-int64_t integerOr(const ImageFile& file, const std::string& name, int64_t fallback) {
-  const Attribute* a = find(file, name);
-  if (!a) return fallback;
-  return a->kind == Attribute::Kind::String ? std::atoll(a->text.c_str()) : a->integer;
-}
-
-Rgb<float> layerOrNone(const ImageFile& file, const std::string& layer) {
-  return hasLayer(file, layer) ? file.rgb(layer) : Rgb<float>();
-}
-
-// "<prefix>pt" for every layer "<prefix>pt.mean".
-std::vector<std::string> estimateNames(const ImageFile& file) {
-  std::vector<std::string> names;
-  const std::string ending = ".mean.R";
-  for (const std::string& channel : file.channelNames)
-    if (channel.size() > ending.size() && channel.ends_with(ending))
-      names.push_back(channel.substr(0, channel.size() - ending.size()));
-  return names;
-}
-
-// The passes N of the layers <layer>.varianceN, in rising order.
-std::set<uint64_t> checkpointPasses(const ImageFile& file, const std::string& layer) {
-  const std::string prefix = layer + ".variance", suffix = ".R";
-  std::set<uint64_t> passes;
-  for (const auto& [channel, plane] : file.planes) {
-    if (!channel.starts_with(prefix) || !channel.ends_with(suffix)) continue;
-    const char *begin = channel.data() + prefix.size(), *end = channel.data() + channel.size() - suffix.size();
-    uint64_t n = 0;
-    if (begin < end && std::from_chars(begin, end, n).ptr == end && n > 0) passes.insert(n);
-  }
-  return passes;
-}
-
-// The variances after 1, 2, 4, … passes, from layers <name>.variance<passes>, and the images where there are some.
-std::vector<Checkpoint> readHistory(const ImageFile& file, const std::string& layer, double secondsPerPass) {
-  std::vector<Checkpoint> history;
-  for (const uint64_t passes : checkpointPasses(file, layer)) {
-    const auto read = [&, n = std::to_string(passes)](const char* part) { return layerOrNone(file, layer + part + n); };
-    Checkpoint c{passes, secondsPerPass * static_cast<double>(passes), read(".variance")};
-    if (c.variance.empty()) continue;
-    c.mean = read(".mean");
-    c.half[0] = read(".halfA");
-    c.half[1] = read(".halfB");
-    history.push_back(std::move(c));
-  }
-  return history;
-}
-
-bool isComplete(const DirectLight& p) {
-  return !p.mean.empty() && !p.half[0].empty() && !p.half[1].empty() && !p.variance.empty();
-}
-
-Estimate readEstimate(const ImageFile& file, const std::string& layer, const std::string& name) {
-  Estimate e;
-  e.name = name;
-  e.mean = file.rgb(layer + ".mean");
-  e.half[0] = layerOrNone(file, layer + ".halfA");
-  e.half[1] = layerOrNone(file, layer + ".halfB");
-  e.variance = layerOrNone(file, layer + ".variance");
-  e.bias = layerOrNone(file, layer + ".bias");
-  e.biasHalf[0] = layerOrNone(file, layer + ".biasA");
-  e.biasHalf[1] = layerOrNone(file, layer + ".biasB");
-  e.biasVariance = layerOrNone(file, layer + ".biasVariance");
-  DirectLight direct{layerOrNone(file, layer + ".direct"),
-                     {layerOrNone(file, layer + ".directA"), layerOrNone(file, layer + ".directB")},
-                     layerOrNone(file, layer + ".directVariance")};
-  e.indirectVariance = layerOrNone(file, layer + ".indirectVariance");
-  if (isComplete(direct) && !e.indirectVariance.empty()) e.direct = std::move(direct);
-  for (int q = 0; q < 4; ++q)
-    if (const std::string quarter = layer + ".q" + std::to_string(q); hasLayer(file, quarter))
-      e.quarter.push_back(file.rgb(quarter));
-  const std::string prefix = "braid/" + name + "/";
-  e.unbiased = integerOr(file, prefix + "unbiased", 1) != 0;
-  e.passes = static_cast<uint64_t>(std::max<int64_t>(0, integerOr(file, prefix + "passes", 0)));
-  if (const Attribute* seconds = find(file, prefix + "seconds")) e.seconds = seconds->number;
-  if (const Attribute* correlation = find(file, prefix + "correlation"))
-    for (const Correlation c : {Correlation::CommonRandomNumbers, Correlation::Gradients})
-      if (correlation->text == toString(c)) e.correlation = c;
-  return e;
-}
-
-FeaturePlanes<Rgb<float>> readFeature(const ImageFile& file, const std::string& layer) {
-  return {layerOrNone(file, layer),
-          {layerOrNone(file, layer + "A"), layerOrNone(file, layer + "B")},
-          layerOrNone(file, layer + "Variance")};
-}
-
-FeaturePlanes<Plane<float>> firstPlanes(FeaturePlanes<Rgb<float>> f) {
-  return {std::move(f.mean[0]), {std::move(f.half[0][0]), std::move(f.half[1][0])}, std::move(f.variance[0])};
-}
-
-Estimates emptyLike(const ImageFile& file) {
-  Estimates all;
-  all.width = file.width;
-  all.height = file.height;
-  all.window = file.window;
-  all.fullWidth = file.fullWidth;
-  all.fullHeight = file.fullHeight;
-  return all;
-}
-
-Estimates readBraid(const ImageFile& file, const std::vector<std::string>& layers) {
-  Estimates all = emptyLike(file);
-  all.seed = static_cast<uint64_t>(integerOr(file, "braid/seed", 0));
-  std::string prefix;
-  for (const std::string& layer : layers) {
-    const size_t dot = layer.rfind('.');
-    if (dot != std::string::npos) prefix = layer.substr(0, dot + 1);
-    const Estimate e = readEstimate(file, layer, dot == std::string::npos ? layer : layer.substr(dot + 1));
-    const double secondsPerPass = e.passes > 0 ? e.seconds / static_cast<double>(e.passes) : 0.0;
-    std::vector<Checkpoint> history = readHistory(file, layer, secondsPerPass);
-    if (!history.empty()) all.history[e.name] = std::move(history);
-    all.estimates.push_back(e);
-  }
-  Features f{readFeature(file, prefix + "Albedo"), readFeature(file, prefix + "N"),
-             firstPlanes(readFeature(file, prefix + "Depth")), firstPlanes(readFeature(file, prefix + "Visibility"))};
-  if (completeFeatures(f, file.width, file.height)) all.features = std::move(f);
-  return all;
-}
 
 bool complete(const Rgb<float> (&half)[2]) { return !half[0].empty() && !half[1].empty(); }
 
@@ -260,24 +125,63 @@ Rgb<float> meanOfHalves(const Estimate& e) {
   return mean;
 }
 
-}  // namespace
+// What an option names: its text, its files, and the estimate or layer of the first one.
+struct Named {
+  const std::string& text;
+  const std::vector<std::string>& files;
+  const std::string& name;
+};
 
-std::vector<Attribute> estimateAttributes(const Estimates& all, bool timing) {
-  using Kind = Attribute::Kind;
-  std::vector<Attribute> list{{"braid/seed", Kind::String, std::to_string(all.seed), 0, 0, {}}};
-  for (const Estimate& e : all.estimates) {
-    const std::string prefix = "braid/" + e.name + "/";
-    list.push_back({prefix + "unbiased", Kind::Int, "", e.unbiased ? 1 : 0, 0, {}});
-    list.push_back({prefix + "correlation", Kind::String, toString(e.correlation), 0, 0, {}});
-    list.push_back({prefix + "passes", Kind::Int, "", static_cast<int64_t>(e.passes), 0, {}});
-    if (timing) list.push_back({prefix + "seconds", Kind::Float, "", 0, e.seconds, {}});
+// Two files are the halves of a mean; three are an image and its halves.
+void addHalves(Estimate& first, const Named& named, const ImageFile& head, const ReadOptions& options) {
+  const auto& [text, files, name] = named;
+  if (files.size() == 2) {
+    Companion other = readCompanion(files[1], name, head, options);
+    requireOtherSeed(head, other.head);
+    requireDifferent(first.mean, other.colour, text);
+    if (options.alpha && !options.alpha->empty() && !other.alpha.empty())
+      for (size_t i = 0; i < other.alpha.size(); ++i)
+        (*options.alpha)[i] = 0.5f * (*options.alpha)[i] + 0.5f * other.alpha[i];
+    first.half[0] = first.mean;
+    first.half[1] = std::move(other.colour);
+    first.mean = meanOfHalves(first);
+    first.variance = Rgb<float>();  // was that of one half
+    first.passes *= 2;
+    first.quarter.clear();
+  } else if (files.size() == 3) {
+    Companion a = readCompanion(files[1], name, head, options), b = readCompanion(files[2], name, head, options);
+    requireOtherSeed(a.head, b.head);
+    requireDifferent(a.colour, b.colour, text);
+    first.half[0] = std::move(a.colour);
+    first.half[1] = std::move(b.colour);
   }
-  return list;
 }
+
+// Fills in what can be told from the rest, and notes what is missing.
+void completeEstimates(Estimates& all, const std::string& path, bool braids, const ReadOptions& options) {
+  const Estimate& first = all.estimates.front();
+  const uint64_t filled = braids ? 0 : fillInvalid(all);
+  if (filled > 0 && options.notes)
+    options.notes->push_back(
+        fmt::format("{}: {} pixels are not finite: they have no weight and are filled from the "
+                    "other half or their neighbours",
+                    path, filled));
+  for (Estimate& e : all.estimates)
+    if (e.unbiased) varianceFromHalves(e, path, options.notes);
+  if (options.derive && !braids && first.unbiased) deriveStatistics(all, path, options.notes);
+  if (options.notes && !complete(first.half))
+    options.notes->push_back(fmt::format(
+        "{}: no halves of {}: give two renders with different seeds as A.exr,B.exr for methods that need them", path,
+        first.name));
+  if (options.notes && first.unbiased && first.variance.empty())
+    options.notes->push_back(fmt::format("{}: no variance of {}", path, first.name));
+}
+
+}  // namespace
 
 // A file of braid without estimates is what renders write unless they are told otherwise.
 void noteMissingEstimates(const ImageFile& file, const ReadOptions& options) {
-  const Attribute *software = find(file, "Software"), *headline = find(file, "braid/headline");
+  const Attribute *software = findAttribute(file, "Software"), *headline = findAttribute(file, "braid/headline");
   if (options.role != ImageRole::Noisy || !software || !software->text.starts_with("braid ")) return;
   if (headline)
     throw Error(ExitCode::BadInput,
@@ -294,7 +198,7 @@ Estimates readEstimates(const ImageFile& file, const ReadOptions& options) {
   if (!layers.empty()) {
     if (const auto alpha = file.planes.find("A"); options.alpha && alpha != file.planes.end())
       *options.alpha = alpha->second;
-    return readBraid(file, layers);
+    return readBraidImage(file, layers);
   }
   noteMissingEstimates(file, options);
   Estimates all = emptyLike(file);
@@ -326,42 +230,8 @@ Estimates readEstimatesOption(const std::string& text, const ReadOptions& option
     first.direct = {};
     first.indirectVariance = {};
   }
-  const ImageFile head = headOf(file);
-  if (files.size() == 2) {
-    Companion other = readCompanion(files[1], name, head, options);
-    requireOtherSeed(head, other.head);
-    requireDifferent(first.mean, other.colour, text);
-    if (options.alpha && !options.alpha->empty() && !other.alpha.empty())
-      for (size_t i = 0; i < other.alpha.size(); ++i)
-        (*options.alpha)[i] = 0.5f * (*options.alpha)[i] + 0.5f * other.alpha[i];
-    first.half[0] = first.mean;
-    first.half[1] = std::move(other.colour);
-    first.mean = meanOfHalves(first);
-    first.variance = Rgb<float>();  // was that of one half
-    first.passes *= 2;
-    first.quarter.clear();
-  } else if (files.size() == 3) {
-    Companion a = readCompanion(files[1], name, head, options), b = readCompanion(files[2], name, head, options);
-    requireOtherSeed(a.head, b.head);
-    requireDifferent(a.colour, b.colour, text);
-    first.half[0] = std::move(a.colour);
-    first.half[1] = std::move(b.colour);
-  }
-  const uint64_t filled = braids ? 0 : fillInvalid(all);
-  if (filled > 0 && options.notes)
-    options.notes->push_back(
-        fmt::format("{}: {} pixels are not finite: they have no weight and are filled from the "
-                    "other half or their neighbours",
-                    path, filled));
-  for (Estimate& e : all.estimates)
-    if (e.unbiased) varianceFromHalves(e, path, options.notes);
-  if (options.derive && !braids && first.unbiased) deriveStatistics(all, path, options.notes);
-  if (options.notes && !complete(first.half))
-    options.notes->push_back(fmt::format(
-        "{}: no halves of {}: give two renders with different seeds as A.exr,B.exr for methods that need them", path,
-        first.name));
-  if (options.notes && first.unbiased && first.variance.empty())
-    options.notes->push_back(fmt::format("{}: no variance of {}", path, first.name));
+  addHalves(first, {text, files, name}, headOf(file), options);
+  completeEstimates(all, path, braids, options);
   return all;
 }
 

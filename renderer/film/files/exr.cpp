@@ -17,6 +17,7 @@
 #include "renderer/film/files/exr_rows.h"
 #include "renderer/film/files/output_file.h"
 #include "renderer/images/image_codecs.h"
+#include "renderer/film/planes.h"
 
 namespace braid {
 
@@ -26,7 +27,6 @@ constexpr float kHalfMax = 65504;
 
 using Names = std::array<const char*, 3>;
 constexpr Names kColour = {"R", "G", "B"};
-constexpr Names kVector = {"X", "Y", "Z"};
 
 // The channels of a file, all of one size.
 class ChannelList {
@@ -63,33 +63,30 @@ class ChannelList {
   std::vector<ExrChannel> list_;
 };
 
-template <class P, class N>
-void addFeature(ChannelList& channels, const std::string& layer, const N& names, const FeaturePlanes<P>& f, bool all) {
-  channels.add(layer, names, f.mean);
-  if (!all) return;
-  channels.add(layer + "A", names, f.half[0]);
-  channels.add(layer + "B", names, f.half[1]);
-  channels.add(layer + "Variance", names, f.variance);
+// `all`: with the halves and the variance of the mean.
+void addFeatures(ChannelList& channels, const Features& features, bool all, bool half) {
+  for (size_t f = 0; f < kFeaturePlanes.size(); ++f) {
+    channels.setHalf(half && !all && !kFeaturePlanes[f].anySize);
+    const std::string components = kFeaturePlanes[f].components;
+    for (size_t part = 0; part < (all ? kFeatureParts.size() : 1); ++part)
+      for (size_t c = 0; c < components.size(); ++c)
+        channels.add(std::string(kFeaturePlanes[f].name) + kFeatureParts[part] + '.' + components[c],
+                     featurePlane(features, f, part, c));
+  }
+  channels.setHalf(false);
 }
 
 void addEstimate(ChannelList& channels, const Estimate& e, const ExrOptions& options) {
-  channels.add(e.name + ".mean", kColour, e.mean);
-  channels.add(e.name + ".halfA", kColour, e.half[0]);
-  channels.add(e.name + ".halfB", kColour, e.half[1]);
-  channels.add(e.name + ".variance", kColour, e.variance);
-  channels.add(e.name + ".bias", kColour, e.bias);
-  channels.add(e.name + ".biasA", kColour, e.biasHalf[0]);
-  channels.add(e.name + ".biasB", kColour, e.biasHalf[1]);
-  channels.add(e.name + ".biasVariance", kColour, e.biasVariance);
-  if (options.directIndirect) {
-    channels.add(e.name + ".direct", kColour, e.direct.mean);
-    channels.add(e.name + ".directA", kColour, e.direct.half[0]);
-    channels.add(e.name + ".directB", kColour, e.direct.half[1]);
-    channels.add(e.name + ".directVariance", kColour, e.direct.variance);
-    channels.add(e.name + ".indirectVariance", kColour, e.indirectVariance);
-  }
+  for (const EstimatePlane& p : estimatePlanes())
+    if (p.set != PlaneSet::Direct || options.directIndirect) channels.add(e.name + '.' + p.name, kColour, p.in(e));
   if (!options.quarters) return;
-  for (size_t q = 0; q < e.quarter.size(); ++q) channels.add(e.name + ".q" + std::to_string(q), kColour, e.quarter[q]);
+  for (size_t q = 0; q < e.quarter.size(); ++q) channels.add(e.name + '.' + quarterName(q), kColour, e.quarter[q]);
+}
+
+void addHistory(ChannelList& channels, const std::string& estimate, const std::vector<Checkpoint>& history) {
+  for (const Checkpoint& c : history)
+    for (const HistoryPlane& p : historyPlanes())
+      channels.add(estimate + '.' + p.name + std::to_string(c.passes), kColour, p.in(c));
 }
 
 }  // namespace
@@ -101,15 +98,7 @@ std::vector<ExrChannel> namedPlanes(const Estimates& estimates, const Rgb<float>
   for (size_t c = 0; c < 3; ++c) channels.addHeadline(kColour[c], headline[c], half);
   if (alpha) channels.addHeadline("A", *alpha, half);
   const bool all = options.aovs == AovSet::All;
-  if (options.aovs != AovSet::None && estimates.features) {
-    const Features& f = *estimates.features;
-    channels.setHalf(!all && half);
-    addFeature(channels, "Albedo", kColour, f.albedo, all);
-    addFeature(channels, "N", kVector, f.normal, all);
-    addFeature(channels, "Visibility", "V", f.visibility, all);
-    channels.setHalf(false);  // metres may be any
-    addFeature(channels, "Depth", "Z", f.depth, all);
-  }
+  if (options.aovs != AovSet::None && estimates.features) addFeatures(channels, *estimates.features, all, half);
   if (options.aovs == AovSet::Features)
     for (const ExrLayer& layer : options.layers)
       if (layer.name == "Error" && layer.plane) channels.add(layer.name, "Y", *layer.plane);
@@ -117,14 +106,7 @@ std::vector<ExrChannel> namedPlanes(const Estimates& estimates, const Rgb<float>
   for (const Estimate& e : estimates.estimates) {
     addEstimate(channels, e, options);
     const auto history = estimates.history.find(e.name);
-    if (!options.history || history == estimates.history.end()) continue;
-    for (const Checkpoint& c : history->second) {
-      const std::string passes = std::to_string(c.passes);
-      channels.add(e.name + ".variance" + passes, kColour, c.variance);
-      channels.add(e.name + ".mean" + passes, kColour, c.mean);
-      channels.add(e.name + ".halfA" + passes, kColour, c.half[0]);
-      channels.add(e.name + ".halfB" + passes, kColour, c.half[1]);
-    }
+    if (options.history && history != estimates.history.end()) addHistory(channels, e.name, history->second);
   }
   for (const ExrLayer& layer : options.layers) {
     if (layer.planes) channels.add(layer.name, kColour, *layer.planes);
