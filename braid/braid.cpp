@@ -30,7 +30,7 @@ RenderPlan plan(const Scene& scene, const Settings& settings) {
 Rendering render(const Scene& scene, const RenderPlan& plan, const Session::ProgressCallback& progress) {
   Rendering r{Session(scene, plan.plan).run(progress), {}};
   ExrOptions options;
-  options.quarters = plan.plan.settings.quarters;
+  options.quarters = plan.plan.settings.keep.quarters;
   for (const ExrChannel& p : namedPlanes(*r.estimates, r.image, r.alpha ? &*r.alpha : nullptr, options))
     r.planes.emplace(p.name, *p.plane);
   return r;

@@ -6,6 +6,8 @@
 // and variances are variances of the mean.
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
@@ -13,6 +15,7 @@
 #include <vector>
 
 #include "renderer/film/estimates.h"
+#include "renderer/film/kept_buffers.h"
 
 namespace braid {
 
@@ -39,26 +42,28 @@ class MethodOptions {
   std::map<std::string, double> values_;
 };
 
-// What a method must be given. What is missing keeps it from running, with a sentence that names it.
+// What a method must be given: what is missing keeps it from running, with a sentence that names it. And what makes its
+// image better.
 struct Needs {
   bool biased = false;      // a smooth image with halves: a denoiser's, a photon map's or another combiner's
+  bool redenoise = false;   // the biased image must come from a denoiser, which is run again
   bool correlated = false;  // an estimate by common random numbers or gradients
+  bool reference = false;   // the image that is to be estimated: for comparisons only, no render has it
   int bases = 0;            // images with halves to choose from
   // Takes, beyond those `bases`, what there is: the bases or denoisers that a user names, and biased estimates such as
   // photon maps.
   bool anyBases = false;
-  bool quarters = false;      // of the unbiased (and the correlated) estimate
-  bool quartersHelp = false;  // reads few of their values, MethodInputs::quarters; works without, but worse
-  // Of the unbiased estimate, unless photon maps are among the bases; works without, but worse.
-  bool directIndirectHelps = false;
-  bool features = false;      // works without, but worse
-  bool featureNoise = false;  // of the features not only the means, also halves and variances
+
+  // Of the unbiased estimate.
+  uint64_t passes = 2;
   int checkpoints = 0;
-  uint64_t passes = 2;     // of the unbiased estimate
-  bool halves = true;      // of the unbiased and the biased image and the bases; false: works on the means alone
-  bool variance = true;    // of the unbiased estimate; false: works without
-  bool redenoise = false;  // the biased image must come from a denoiser, which is run again
-  bool reference = false;  // the image that is to be estimated: for comparisons only, no render has it
+  bool variance = true;
+  bool quarters = false;  // of the correlated one too
+  bool halves = true;     // of the biased image and the bases too; false: works on the means alone
+
+  // Works without, but worse. Quarters: few of their values are read, MethodInputs::quarters. Direct light is not read
+  // where photon maps are among the bases.
+  KeptBuffers helpful;
 };
 
 // The quarters of an estimate in the units that they were given in, of which a copy in those of the method would take
@@ -68,30 +73,43 @@ struct GivenQuarters {
   double scale = 1;                                 // to the units of the method
 };
 
-// The inputs of one method. Pointers that needs() does not ask for may be null. Widths and heights agree.
-struct MethodInputs {
+// The estimate that a method improves.
+struct UnbiasedInput {
   const Estimate* unbiased = nullptr;  // mean, halves, variance
   Estimate* consumable = nullptr;      // the same, if nobody reads it afterwards: a method may change it
-  GivenQuarters quarters;              // of the unbiased estimate
-  const Estimate* biased = nullptr;    // mean, halves; variance and bias where known
-  GivenQuarters biasedQuarters;        // of the biased estimate, unless a method made it
-  std::vector<const Estimate*> bases;
-  const Estimate* correlated = nullptr;
-  const Features* features = nullptr;
-  const Rgb<float>* reference = nullptr;
-  const std::vector<Checkpoint>* history = nullptr;  // of the unbiased estimate, oldest first
-  // Runs the denoiser that made `biased` on another colour image, everything else unchanged.
+  GivenQuarters quarters;
+  const std::vector<Checkpoint>* history = nullptr;  // oldest first
+  // The same of fewer passes, mean, halves and variance, that `biased` and `redenoise` are made of; null: they are made
+  // of `unbiased`. For StoppingMethod only.
+  const Estimate* stopped = nullptr;
+};
+
+// A smooth image with an unknown bias.
+struct BiasedInput {
+  const Estimate* biased = nullptr;  // mean, halves; variance and bias where known
+  GivenQuarters biasedQuarters;      // unless a method made it
+  // Runs the denoiser that made it on another colour image, everything else unchanged.
   std::function<Rgb<float>(const Rgb<float>&)> redenoise;
   // Runs it on half h (0 or 1) of its colour alone. Null: its halves share no weights anyway, or there are no quarters,
   // which show the noise of a half.
   std::function<Rgb<float>(int h)> denoiseHalf;
-  bool meanOnly = false;  // of the result only image.mean will be read
-  uint64_t seed = 0;
+};
+
+// How a method runs, whatever its images.
+struct MethodRun {
   MethodOptions options;
+  uint64_t seed = 0;
+  bool meanOnly = false;                      // of the result only image.mean will be read
   const std::atomic<bool>* cancel = nullptr;  // a cancelled method may return anything
-  // The unbiased estimate of fewer passes, mean, halves and variance, that `biased` and `redenoise` are made of; null:
-  // they are made of `unbiased`. For StoppingMethod only.
-  const Estimate* stopped = nullptr;
+  bool cancelled() const { return cancel && cancel->load(); }
+};
+
+// The inputs of one method. Pointers that needs() does not ask for may be null. Widths and heights agree.
+struct MethodInputs : UnbiasedInput, BiasedInput, MethodRun {
+  std::vector<const Estimate*> bases;
+  const Estimate* correlated = nullptr;
+  const Features* features = nullptr;
+  const Rgb<float>* reference = nullptr;
 };
 
 struct NamedPlane {
@@ -138,7 +156,7 @@ class Method {
   virtual MethodMemory memory(const MemoryCase& of) const = 0;
   virtual std::vector<OptionInfo> options() const { return {}; }
   // Whether a half of the result depends on the other half of the colour, as where weights are made of all samples.
-  // Such a denoiser asks for quarters (Needs::quartersHelp).
+  // Such a denoiser asks for quarters (Needs::helpful).
   virtual bool halvesShareWeights() const { return false; }
   // Deterministic for any number of threads. A denoiser reads inputs.unbiased and inputs.features.
   virtual MethodResult run(const MethodInputs& inputs) const = 0;

@@ -54,7 +54,7 @@ class PathKernel {
         sampler_(sampler),
         record_(record),
         roulette_(roulette),
-        wantFeatures_(plan.features),
+        wantFeatures_(plan.kept.features),
         filtered_(context.scene.accel().filtered()),
         cameraMedia_(mediaOfCamera(context.scene, plan.camera)),
         shadowRays_(context) {}

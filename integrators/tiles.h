@@ -72,7 +72,7 @@ inline void storeSample(const PassRequest& request, int x, int y, const PathSamp
   if (!target.add(px, py, radiance) && request.statistics)
     request.statistics->rejectedPixel = static_cast<int64_t>(y) * plan.settings.width + x;
   if (target.wantsDirect()) target.direct(px, py, direct);
-  if (plan.features) target.features(px, py, sample.features);
+  if (plan.kept.features) target.features(px, py, sample.features);
   if (target.wantsCoverage()) target.coverage(px, py, sample.coverage);
 }
 

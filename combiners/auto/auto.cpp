@@ -62,8 +62,8 @@ class Auto : public Method {
   Needs needs() const override {
     Needs needs;
     needs.anyBases = true;
-    needs.features = needs.featureNoise = true;
-    needs.quartersHelp = needs.directIndirectHelps = true;
+    needs.helpful.features = needs.helpful.featureNoise = true;
+    needs.helpful.quarters = needs.helpful.directIndirect = true;
     return needs;
   }
   MethodMemory memory(const MemoryCase& of) const override;

@@ -117,7 +117,7 @@ class Oidn : public ExternalMethod {
   Needs needs() const override {
     Needs needs;
     needs.passes = 1;
-    needs.features = needs.featureNoise = true;
+    needs.helpful.features = needs.helpful.featureNoise = true;
     needs.halves = needs.variance = false;
     return needs;
   }

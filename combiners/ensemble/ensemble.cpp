@@ -46,7 +46,7 @@ class Ensemble : public Method {
   Needs needs() const override {
     Needs needs;
     needs.bases = 2;
-    needs.features = true;
+    needs.helpful.features = true;
     needs.variance = false;
     return needs;
   }

@@ -30,7 +30,7 @@ class EnsembleOracle : public Method {
   Needs needs() const override {
     Needs needs;
     needs.bases = 2;
-    needs.features = needs.reference = true;
+    needs.helpful.features = needs.reference = true;
     needs.variance = false;
     return needs;
   }

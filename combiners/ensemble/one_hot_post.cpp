@@ -16,7 +16,7 @@ class OneHotPost : public Method {
   MethodKind kind() const override { return MethodKind::Combiner; }
   Needs needs() const override {
     Needs needs = oneHotNeeds();
-    needs.features = true;
+    needs.helpful.features = true;
     return needs;
   }
   MethodMemory memory(const MemoryCase& of) const override { return {104 + 8 * of.bases, 40 + 4 * of.bases}; }

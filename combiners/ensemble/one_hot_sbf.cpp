@@ -16,7 +16,7 @@ class OneHotSbf : public Method {
   MethodKind kind() const override { return MethodKind::Combiner; }
   Needs needs() const override {
     Needs needs = oneHotNeeds();
-    needs.features = needs.featureNoise = true;
+    needs.helpful.features = needs.helpful.featureNoise = true;
     return needs;
   }
   MethodMemory memory(const MemoryCase& of) const override { return {68 + 8 * of.bases, 40 + 4 * of.bases}; }

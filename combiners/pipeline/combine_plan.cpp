@@ -343,20 +343,18 @@ CombinePlan makeCombinePlan(const AvailableEstimates& available, const std::vect
   return std::move(maker.combinePlan);
 }
 
-CombinePlanNeeds needsOf(const CombinePlan& combinePlan) {
-  CombinePlanNeeds all;
+KeptBuffers buffersOf(const CombinePlan& combinePlan) {
+  KeptBuffers all;
   for (const Step& step : combinePlan.steps) {
     if (!step.skipReason.empty()) continue;
     const Needs needs = step.method->needs();
-    all.quarters |= needs.quarters || needs.quartersHelp;
-    all.features |= needs.features;
-    all.featureNoise |= needs.featureNoise;
-    all.directIndirect |= step.directIndirect;
-    all.checkpoints = std::max(all.checkpoints, needs.checkpoints);
-    if (step.stop > 0) all.stops.push_back(step.stop);
+    KeptBuffers read = needs.helpful;
+    read.quarters |= needs.quarters;
+    read.history |= needs.checkpoints > 0;
+    read.directIndirect = step.directIndirect;
+    if (step.stop > 0) read.stops = {step.stop};
+    all |= read;
   }
-  std::sort(all.stops.begin(), all.stops.end());
-  all.stops.erase(std::unique(all.stops.begin(), all.stops.end()), all.stops.end());
   return all;
 }
 

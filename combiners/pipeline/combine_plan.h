@@ -77,12 +77,7 @@ CombinePlan makeCombinePlan(const AvailableEstimates& available, const std::vect
                             const CombinePlanOptions& options);
 
 // What a render must keep for the steps that can run.
-struct CombinePlanNeeds {
-  bool quarters = false, features = false, featureNoise = false, directIndirect = false;
-  int checkpoints = 0;
-  std::vector<uint64_t> stops{};  // passes after which the image is kept, rising
-};
-CombinePlanNeeds needsOf(const CombinePlan& combinePlan);
+KeptBuffers buffersOf(const CombinePlan& combinePlan);
 
 // Whether a method of exactly this name is registered.
 bool isMethod(const std::string& name);

@@ -176,7 +176,8 @@ Estimate normalised(const Estimate& e, double k, SanitiseReport& report, bool qu
   return out;
 }
 
-Estimates normalised(const Estimates& all, double k, SanitiseReport& report, const PlanesRead& read) {
+Estimates normalised(const Estimates& all, double k, SanitiseReport& report, const PlanesRead& planes) {
+  const KeptBuffers& read = planes.buffers;
   Estimates out;
   static_cast<EstimatesHead&>(out) = all;
   for (const Estimate& e : all.estimates)
@@ -184,7 +185,7 @@ Estimates normalised(const Estimates& all, double k, SanitiseReport& report, con
   if (read.history)
     for (const auto& [name, checkpoints] : all.history)
       for (const Checkpoint& c : checkpoints) out.history[name].push_back(changed(c, k, report));
-  if (read.reference) out.reference = changed(all.reference, colours(k), report);
+  if (planes.reference) out.reference = changed(all.reference, colours(k), report);
   if (!all.features || !read.features) return out;
   Features& features = out.features.emplace();
   features.albedo = changed(all.features->albedo, read.featureNoise, report);

@@ -33,10 +33,8 @@ struct SanitiseReport {
 
 // Which planes a copy holds besides means, halves, variances and biases.
 struct PlanesRead {
-  bool quarters = true, history = true;
-  bool features = true, featureNoise = true;  // the noise: halves and variances
+  KeptBuffers buffers = KeptBuffers::everything();
   bool reference = true;
-  bool directIndirect = true;
 };
 
 // The estimates as methods see them. Non-finite values, which fillInvalid() leaves none of, and negative variances

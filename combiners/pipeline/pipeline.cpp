@@ -112,8 +112,9 @@ void Runner::take(const CombinePlan& combinePlan) {
   const Estimate* e = given_->find(unbiased);
   result.exposure = options_.exposure > 0 ? options_.exposure : e ? exposureScale(e->mean) : 1.0;
   PlanesRead read = planesRead(combinePlan);
-  const bool fit = read.features && given_->features && isSane(*given_->features, read.featureNoise);
-  read.features = read.features && !fit;
+  bool& features = read.buffers.features;
+  const bool fit = features && given_->features && isSane(*given_->features, read.buffers.featureNoise);
+  features = features && !fit;
   all_ = normalised(*given_, result.exposure, result.sanitised, read);
   features_ = fit ? &*given_->features : all_.features ? &*all_.features : nullptr;
 }
@@ -283,18 +284,18 @@ const PipelineOutput* PipelineResult::find(const std::string& name) const {
 }
 
 PlanesRead planesRead(const CombinePlan& combinePlan) {
-  const CombinePlanNeeds needs = needsOf(combinePlan);
-  // Photon maps, which are bases, are fused with all of the quarters.
-  const bool quarters = std::any_of(combinePlan.steps.begin(), combinePlan.steps.end(), [](const Step& step) {
-    const Needs of = step.method->needs();
-    return step.skipReason.empty() && (of.quarters || (of.quartersHelp && !step.bases.empty()));
-  });
-  const bool reference = std::any_of(combinePlan.steps.begin(), combinePlan.steps.end(), [](const Step& step) {
-    return step.skipReason.empty() && step.method->needs().reference;
-  });
-  return {quarters,       needs.checkpoints > 0 || !needs.stops.empty(),
-          needs.features, needs.featureNoise,
-          reference,      needs.directIndirect};
+  PlanesRead read{buffersOf(combinePlan), false};
+  KeptBuffers& buffers = read.buffers;
+  buffers.history = buffers.history || !buffers.stops.empty();
+  buffers.quarters = false;
+  for (const Step& step : combinePlan.steps) {
+    if (!step.skipReason.empty()) continue;
+    const Needs needs = step.method->needs();
+    // Photon maps, which are bases, are fused with all of the quarters.
+    buffers.quarters |= needs.quarters || (needs.helpful.quarters && !step.bases.empty());
+    read.reference |= needs.reference;
+  }
+  return read;
 }
 
 PipelineResult runPipeline(const Estimates& estimates, const std::vector<std::string>& wanted,

@@ -68,7 +68,8 @@ int colourMemory(const AvailableEstimates& available) {
 // With the mean, two halves and the variance.
 constexpr int kFeatureMemory = 4 * kFeatureComponents * static_cast<int>(sizeof(float));
 
-AvailableEstimates copiedAvailable(AvailableEstimates available, const PlanesRead& read) {
+AvailableEstimates copiedAvailable(AvailableEstimates available, const PlanesRead& planes) {
+  const KeptBuffers& read = planes.buffers;
   for (AvailableEstimate& e : available.estimates) {
     e.quarters &= read.quarters;
     e.directIndirect &= read.directIndirect;
@@ -76,7 +77,7 @@ AvailableEstimates copiedAvailable(AvailableEstimates available, const PlanesRea
     e.checkpoints = 0;
     e.kept.clear();
   }
-  available.reference &= read.reference;
+  available.reference &= planes.reference;
   return available;
 }
 

@@ -224,8 +224,8 @@ class DoubleShrinkageMethod : public Method {
   Needs needs() const override {
     Needs needs;
     needs.biased = true;
-    needs.features = needs.featureNoise = true;
-    needs.quartersHelp = true;
+    needs.helpful.features = needs.helpful.featureNoise = true;
+    needs.helpful.quarters = true;
     needs.passes = 4;
     return needs;
   }

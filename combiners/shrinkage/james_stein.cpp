@@ -59,7 +59,7 @@ class JamesStein : public Method {
   Needs needs() const override {
     Needs needs;
     needs.biased = true;
-    needs.features = needs.featureNoise = true;
+    needs.helpful.features = needs.helpful.featureNoise = true;
     needs.passes = 4;
     return needs;
   }

@@ -63,7 +63,7 @@ bool renderBidirectionalPass(const PassRequest& request, PassTarget& target, Str
 void replayBidirectionalPixel(const PassRequest& request, int x, int y, StrategyObserver& observer) {
   const Pass pass(request);
   const PixelWindow& w = request.plan.window;
-  PassTarget target(w.width(), w.height(), true, request.plan.features, request.plan.settings.transparent);
+  PassTarget target(w.width(), w.height(), true, request.plan.kept.features, request.plan.settings.transparent);
   BidirectionalKernel(request, pass.lights, pass.eyeSampler, pass.cameraMedia, target, &observer).render({{x, y}});
 }
 

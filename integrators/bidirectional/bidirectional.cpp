@@ -200,7 +200,7 @@ Onward BidirectionalKernel::shadeEyeVertex(int index, const SubpathState& state,
   if (material.emissive) addEmission(index, state, vertex);
   bool& featuresDone = featuresDone_[static_cast<size_t>(index)];
   const bool first =
-      plan_.features && !featuresDone &&
+      plan_.kept.features && !featuresDone &&
       recordFeatures(scene_, vertex, plan_.settings.maxDepth, sample_[static_cast<size_t>(index)].features);
   featuresDone = featuresDone || first;
   if (vertex.segments >= plan_.settings.maxDepth) return Onward::Pass;
@@ -215,7 +215,7 @@ Onward BidirectionalKernel::shadeEyeVertex(int index, const SubpathState& state,
 void BidirectionalKernel::addUnlit(int index, const SubpathState& state, const SubpathVertex& vertex) {
   bool& done = featuresDone_[static_cast<size_t>(index)];
   const Spectrum color =
-      unlitColor(scene_, vertex, plan_.features && !done, sample_[static_cast<size_t>(index)].features);
+      unlitColor(scene_, vertex, plan_.kept.features && !done, sample_[static_cast<size_t>(index)].features);
   done = true;
   if (state.lightCouldNotBeSampled) add(index, 0, vertex.segments + 1, vertex.throughput * color);
 }
@@ -247,7 +247,7 @@ void BidirectionalKernel::addEnvironment(int index, const SubpathState& state) {
     radiance = *plan_.settings.background;
   else if (scene_.environment())
     radiance = scene_.environment()->radiance(state.direction);
-  if (plan_.features && !featuresDone_[static_cast<size_t>(index)]) {
+  if (plan_.kept.features && !featuresDone_[static_cast<size_t>(index)]) {
     sample.features.setAlbedo(radiance);
     sample.features.normal = -state.direction;
     sample.features.depth = 0;

@@ -64,7 +64,7 @@ class StrategyFilms final : public StrategyObserver {
 std::vector<StrategyImage> renderStrategies(const TransportContext& context, const Plan& plan, uint64_t passes) {
   const LightPreparation preparation(context);
   StrategyFilms films(plan.window, preparation.splatFractionBits);
-  PassTarget target(plan.window.width(), plan.window.height(), true, plan.features, plan.settings.transparent);
+  PassTarget target(plan.window.width(), plan.window.height(), true, plan.kept.features, plan.settings.transparent);
   for (uint64_t pass = 0; pass < passes; ++pass) {
     target.clear();
     PassRequest request{context, plan, pass};

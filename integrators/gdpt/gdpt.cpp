@@ -29,7 +29,7 @@ struct BackgroundPixels : Preparation {
       : background(plan.window.width(), plan.window.height(), 1) {
     Plan probe = plan;
     probe.settings.maxDepth = 1;
-    probe.features = false;
+    probe.kept.features = false;
     for (int ray = 0; ray < kBackgroundRays; ++ray) {
       // Points of one bucket are stratified over the pixel.
       const PassSampler sampler(SamplerKind::Sobol, plan.settings.seed, kBackgroundStream,
@@ -172,7 +172,7 @@ bool GradientDomainPathTracer::samplePass(const PassRequest& request, PassSample
           const GradientSample& sample = kernel.sample(i);
           const int x = frameX - plan.window.x0, y = frameY - plan.window.y0;
           samples.set(samples.base[0].index(x, y), sample, plan.settings.clamp);
-          if (plan.features) target.features(x, y, sample.path.features);
+          if (plan.kept.features) target.features(x, y, sample.path.features);
           if (target.wantsCoverage()) target.coverage(x, y, sample.path.coverage);
         });
     return TileCounts{pixelCount(tile), kernel.rayCount, kernel.shadowRayCount};

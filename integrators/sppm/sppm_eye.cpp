@@ -62,7 +62,7 @@ PhotonEyeBatch::Step PhotonEyeBatch::shade(int index, SubpathState& state, Subpa
   if (material.emissive) addEmission(index, state, vertex);
   if (path.seekingLight) return {.onward = Onward::Pass};
   const bool first =
-      plan_.features && !path.featuresDone &&
+      plan_.kept.features && !path.featuresDone &&
       recordFeatures(scene_, vertex, plan_.settings.maxDepth, sample_[static_cast<size_t>(index)].features);
   path.featuresDone = path.featuresDone || first;
   if (vertex.segments >= plan_.settings.maxDepth) return {.onward = Onward::Pass};
@@ -124,7 +124,7 @@ float PhotonEyeBatch::causticHitWeight(int index, const SubpathState& state, uin
 void PhotonEyeBatch::addUnlit(int index, const SubpathState& state, const SubpathVertex& vertex) {
   PathSample& sample = sample_[static_cast<size_t>(index)];
   bool& done = path_[static_cast<size_t>(index)].featuresDone;
-  const Spectrum color = unlitColor(scene_, vertex, plan_.features && !done, sample.features);
+  const Spectrum color = unlitColor(scene_, vertex, plan_.kept.features && !done, sample.features);
   done = true;
   if (state.lightCouldNotBeSampled) sample.radiance += vertex.throughput * color;
 }
@@ -162,7 +162,7 @@ void PhotonEyeBatch::addEnvironment(int index, const SubpathState& state) {
   } else if (scene_.environment()) {
     radiance = scene_.environment()->radiance(state.direction);
   }
-  if (plan_.features && !path.featuresDone) {
+  if (plan_.kept.features && !path.featuresDone) {
     sample.features.setAlbedo(radiance);
     sample.features.normal = -state.direction;
     sample.features.depth = 0;

@@ -51,11 +51,11 @@ std::vector<StateOption> pixelOptions(const Plan& plan) {
       {"--photon-radius", fmt::format("{}", s.photonRadius)},
       {"--photon-direct", yesOrNo(s.photonDirect)},
       {"photon aiming", yesOrNo(s.photonAiming)},
-      {"keeping quarters", yesOrNo(plan.buckets == 4)},
-      {"keeping features", yesOrNo(plan.features)},
-      {"keeping history", yesOrNo(s.history)},
-      {"keeping direct light", yesOrNo(plan.directIndirect)}};
-  for (StateOption& stop : stopOptions(s.stops)) list.push_back(std::move(stop));
+      {"keeping quarters", yesOrNo(plan.kept.quarters)},
+      {"keeping features", yesOrNo(plan.kept.features)},
+      {"keeping history", yesOrNo(s.keep.history)},
+      {"keeping direct light", yesOrNo(plan.kept.directIndirect)}};
+  for (StateOption& stop : stopOptions(s.keep.stops)) list.push_back(std::move(stop));
   return list;
 }
 

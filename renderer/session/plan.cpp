@@ -124,14 +124,21 @@ void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
                             : fmt::format("{} finite lights: chosen by power", finite)});
 }
 
-void planFilm(Plan& plan) {
+// What the film keeps, and what a pixel of it takes.
+void planBuffers(Plan& plan) {
   const Settings& settings = plan.settings;
-  plan.lines.resize(plan.filmLine);
-  plan.buckets = settings.quarters || settings.full ? 4 : 2;
-  plan.features = settings.features || settings.full;
-  const uint64_t accumulator = plan.buckets == 4 ? 120 : 72;
+  const auto separate = std::count_if(plan.integrators.begin(), plan.integrators.end(),
+                                      [](const auto& p) { return p.integrator->separatesDirectLight(); });
+  KeptBuffers& kept = plan.kept;
+  kept = settings.keep;
+  kept.quarters |= settings.full;
+  kept.features |= settings.full;
+  kept.featureNoise = kept.features;
+  kept.directIndirect = separate > 0 && (kept.directIndirect || settings.full);
+
+  const uint64_t accumulator = kept.quarters ? 120 : 72;
   plan.filmBytesPerPixel = accumulator * plan.integrators.size() + 12;
-  if (plan.features) plan.filmBytesPerPixel += FeatureSample::kComponents * (3 * 8 + 4);
+  if (kept.features) plan.filmBytesPerPixel += FeatureSample::kComponents * (3 * 8 + 4);
   if (settings.transparent) plan.filmBytesPerPixel += 12;
   bool bias = false;
   for (const PlannedIntegrator& p : plan.integrators) {
@@ -139,28 +146,38 @@ void planFilm(Plan& plan) {
     plan.filmBytesPerPixel += 72 + (bias ? 0 : 12);
     bias = true;
   }
-  const auto separate = std::count_if(plan.integrators.begin(), plan.integrators.end(),
-                                      [](const auto& p) { return p.integrator->separatesDirectLight(); });
-  plan.directIndirect = separate > 0 && (settings.directIndirect || settings.full);
-  if (plan.directIndirect) plan.filmBytesPerPixel += (accumulator + 24) * static_cast<uint64_t>(separate) + 12;
-  plan.lines.push_back(
-      {plan.buckets == 4, "quarter buckets",
-       plan.buckets == 4 ? "for outputs or combiners" : "no output or combiner reads quarters: two half buffers"});
-  plan.lines.push_back({plan.features, "features",
-                        plan.features ? "albedo, normal, depth, visibility for outputs or combiners"
-                                      : "no output or combiner reads them"});
-  plan.lines.push_back({plan.directIndirect, "direct light by itself",
-                        plan.directIndirect ? "for outputs or combiners"
-                        : separate == 0     ? "no integrator tells it from the rest"
-                                            : "no output or combiner reads it"});
-  plan.lines.push_back({settings.history, "history",
-                        settings.history ? fmt::format("variances after rounds 1, 2, 4, ...: {} bytes a pixel each",
-                                                       12 * plan.integrators.size())
-                                         : "no combiner looks at convergence"});
-  if (!settings.stops.empty())
-    plan.lines.push_back(
-        {true, "stop of denoising",
-         fmt::format("the image after {} passes: 36 bytes a pixel each", fmt::join(settings.stops, ", "))});
+  if (kept.directIndirect) plan.filmBytesPerPixel += (accumulator + 24) * static_cast<uint64_t>(separate) + 12;
+}
+
+void listBuffers(Plan& plan) {
+  const KeptBuffers& kept = plan.kept;
+  const bool separable = std::any_of(plan.integrators.begin(), plan.integrators.end(),
+                                     [](const auto& p) { return p.integrator->separatesDirectLight(); });
+  const auto line = [&](bool isKept, const char* subject, const std::string& reason) {
+    plan.lines.push_back({isKept, subject, reason});
+  };
+  line(kept.quarters, "quarter buckets",
+       kept.quarters ? "for outputs or combiners" : "no output or combiner reads quarters: two half buffers");
+  line(kept.features, "features",
+       kept.features ? "albedo, normal, depth, visibility for outputs or combiners"
+                     : "no output or combiner reads them");
+  line(kept.directIndirect, "direct light by itself",
+       kept.directIndirect ? "for outputs or combiners"
+       : separable         ? "no output or combiner reads it"
+                           : "no integrator tells it from the rest");
+  line(kept.history, "history",
+       kept.history
+           ? fmt::format("variances after rounds 1, 2, 4, ...: {} bytes a pixel each", 12 * plan.integrators.size())
+           : "no combiner looks at convergence");
+  if (!kept.stops.empty())
+    line(true, "stop of denoising",
+         fmt::format("the image after {} passes: 36 bytes a pixel each", fmt::join(kept.stops, ", ")));
+}
+
+void planFilm(Plan& plan) {
+  plan.lines.resize(plan.filmLine);
+  planBuffers(plan);
+  listBuffers(plan);
   plan.lines.push_back({true, "film",
                         fmt::format("{} bytes a pixel, {:.1f} MiB", plan.filmBytesPerPixel,
                                     static_cast<double>(plan.filmBytesPerPixel) * plan.window.width() *
@@ -193,15 +210,8 @@ Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& sett
   return plan;
 }
 
-void keepAlso(const FilmNeeds& needs, Plan& plan) {
-  Settings& s = plan.settings;
-  s.quarters |= needs.quarters;
-  s.features |= needs.features;
-  s.history |= needs.history;
-  s.directIndirect |= needs.directIndirect;
-  s.stops.insert(s.stops.end(), needs.stops.begin(), needs.stops.end());
-  std::sort(s.stops.begin(), s.stops.end());
-  s.stops.erase(std::unique(s.stops.begin(), s.stops.end()), s.stops.end());
+void keepAlso(const KeptBuffers& more, Plan& plan) {
+  plan.settings.keep |= more;
   planFilm(plan);
 }
 

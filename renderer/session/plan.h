@@ -28,9 +28,7 @@ struct Plan {
   Settings settings;
   Camera camera;
   PixelWindow window;
-  int buckets = 2;
-  bool features = true;
-  bool directIndirect = false;  // of the integrators that separate direct light
+  KeptBuffers kept;  // settings.keep where integrators provide it; more with settings.full
   std::vector<PlannedIntegrator> integrators;
   std::vector<PlanLine> lines;
   // What of the light in view no integrator of the plan can find, and the mend; empty where they find it. The estimated
@@ -39,6 +37,7 @@ struct Plan {
   size_t filmLine = 0;  // of lines: where those about the film begin
   uint64_t filmBytesPerPixel = 0;
 
+  int buckets() const { return kept.quarters ? 4 : 2; }
   // "+ subject: reason" for what is kept, "- subject: reason" for what is left out, one line each.
   std::string text() const;
   uint64_t hash() const;
@@ -53,12 +52,7 @@ inline uint64_t pixelItem(const Plan& plan, int x, int y) {
 Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& settings,
               const std::vector<const Integrator*>& available);
 
-// What readers of the estimates need kept. Stops: numbers of passes after which the image is kept.
-struct FilmNeeds {
-  bool quarters = false, features = false, history = false, directIndirect = false;
-  std::vector<uint64_t> stops;
-};
 // Keeps these as well: the plan that makePlan() would give for such settings, without another look at the scene.
-void keepAlso(const FilmNeeds& needs, Plan& plan);
+void keepAlso(const KeptBuffers& more, Plan& plan);
 
 }  // namespace braid

@@ -23,8 +23,8 @@ PassTarget makeTarget(const Plan& plan) {
     splats = splats || p.integrator->splats();
     bias = bias || p.integrator->estimatesBias();
   }
-  return PassTarget(plan.window.width(), plan.window.height(), splats, plan.features, plan.settings.transparent, bias,
-                    plan.directIndirect);
+  return PassTarget(plan.window.width(), plan.window.height(), splats, plan.kept.features, plan.settings.transparent,
+                    bias, plan.kept.directIndirect);
 }
 
 }  // namespace
@@ -90,7 +90,7 @@ class Session::Loop {
     ++result_.rounds;
     lastRound_ = seconds() - begin;
     film_.seconds = startSeconds_ + seconds();
-    if (plan_.settings.history && std::has_single_bit(result_.rounds)) session_.keepCheckpoints();
+    if (plan_.settings.keep.history && std::has_single_bit(result_.rounds)) session_.keepCheckpoints();
     return true;
   }
 
@@ -162,7 +162,7 @@ Session::Session(const Scene& scene, Plan plan)
   film_.window = plan_.window;
   film_.fullWidth = plan_.settings.width;
   film_.fullHeight = plan_.settings.height;
-  film_.buckets = plan_.buckets;
+  film_.buckets = plan_.buckets();
   for (const PlannedIntegrator& p : plan_.integrators) {
     EstimateState e;
     e.name = p.integrator->name();
@@ -170,11 +170,12 @@ Session::Session(const Scene& scene, Plan plan)
     e.correlation = p.integrator->correlation();
     e.lowDiscrepancy = p.integrator->lowDiscrepancy(plan_.settings);
     e.passesPerRound = p.passesPerRound;
-    e.sums = Accumulator(width, height, plan_.buckets, p.integrator->estimatesBias());
-    if (plan_.directIndirect && p.integrator->separatesDirectLight()) e.parts.emplace(width, height, plan_.buckets);
+    e.sums = Accumulator(width, height, plan_.buckets(), p.integrator->estimatesBias());
+    if (plan_.kept.directIndirect && p.integrator->separatesDirectLight())
+      e.parts.emplace(width, height, plan_.buckets());
     film_.estimates.push_back(std::move(e));
   }
-  if (plan_.features) film_.features.emplace(width, height);
+  if (plan_.kept.features) film_.features.emplace(width, height);
   if (plan_.settings.transparent) film_.coverage.emplace(width, height);
 }
 
@@ -246,7 +247,7 @@ RenderResult Session::run(const ProgressCallback& progress, const std::atomic<bo
   return result;
 }
 
-Estimates Session::estimates() const { return estimatesOf(film_, plan_.settings.quarters); }
+Estimates Session::estimates() const { return estimatesOf(film_, plan_.settings.keep.quarters); }
 
 std::shared_ptr<const Estimates> Session::snapshot() const { return std::make_shared<const Estimates>(estimates()); }
 
@@ -257,7 +258,8 @@ std::optional<Plane<float>> Session::alpha() const {
 
 void Session::keepCheckpoints() {
   // The passes before a later share are not its own: where the stop lies is known when shares are added.
-  const std::vector<uint64_t> stops = plan_.settings.firstRound > 0 ? std::vector<uint64_t>{} : plan_.settings.stops;
+  const std::vector<uint64_t> stops =
+      plan_.settings.firstRound > 0 ? std::vector<uint64_t>{} : plan_.settings.keep.stops;
   for (EstimateState& e : film_.estimates) e.keepCheckpoint(stops);
 }
 

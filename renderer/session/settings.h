@@ -9,6 +9,7 @@
 
 #include "renderer/core/sampler.h"
 #include "renderer/film/film.h"
+#include "renderer/film/kept_buffers.h"
 #include "renderer/transport/lights/light_sampler.h"
 
 namespace braid {
@@ -27,11 +28,7 @@ struct Settings {
   SamplerKind sampler = SamplerKind::Sobol;
   PixelFilter filter = PixelFilter::Box;
   LightStrategy lightStrategy = LightStrategy::Automatic;
-  bool features = true;  // albedo, normal, depth, visibility
-  bool quarters = false;
-  bool directIndirect = false;         // direct light by itself, of integrators that can tell it
-  bool history = false;                // variances after rounds 1, 2, 4, …
-  std::vector<uint64_t> stops;         // passes, rising: the first of these rounds with as many keeps its image as well
+  KeptBuffers keep{.features = true};
   bool transparent = false;            // camera rays that miss: no radiance, alpha 0
   std::optional<Spectrum> background;  // what camera rays that miss see instead of the environment
   float clamp = 0;                     // largest channel of one path's radiance; 0: off (unbiased)

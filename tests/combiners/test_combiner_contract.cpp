@@ -167,9 +167,9 @@ TEST_CASE("What a method does not ask for does not change its image") {
     CAPTURE(std::string(m->name()));
     const Needs needs = m->needs();
     const MethodResult whole = outputOf(*m, all).result;
-    if (!needs.features) CHECK(sameBits(outputOf(*m, noFeatures).result, whole));
-    if (!needs.featureNoise) CHECK(sameBits(outputOf(*m, noNoise).result, whole));
-    if (!needs.quarters && !needs.quartersHelp) CHECK(sameBits(outputOf(*m, noQuarters).result, whole));
+    if (!needs.helpful.features) CHECK(sameBits(outputOf(*m, noFeatures).result, whole));
+    if (!needs.helpful.featureNoise) CHECK(sameBits(outputOf(*m, noNoise).result, whole));
+    if (!needs.quarters && !needs.helpful.quarters) CHECK(sameBits(outputOf(*m, noQuarters).result, whole));
     if (needs.checkpoints == 0) CHECK(sameBits(outputOf(*m, noHistory).result, whole));
     if (!needs.reference) CHECK(sameBits(outputOf(*m, noReference).result, whole));
   }

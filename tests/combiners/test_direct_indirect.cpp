@@ -21,7 +21,7 @@ namespace {
 
 Settings withParts(uint64_t spp, int maxDepth = 32) {
   Settings s = settingsFor(24, 20, spp);
-  s.directIndirect = s.quarters = true;
+  s.keep.directIndirect = s.keep.quarters = true;
   s.maxDepth = maxDepth;
   return s;
 }

@@ -137,7 +137,7 @@ TEST_CASE("Denoisers whose halves share weights ask for the quarters that tell t
   int sharing = 0;
   for (const auto& m : makeMethods())
     if (m->halvesShareWeights()) {
-      CHECK(m->needs().quartersHelp);
+      CHECK(m->needs().helpful.quarters);
       ++sharing;
     }
   CHECK(sharing == 1);

@@ -29,7 +29,7 @@ using Part = Estimate (*)(const Estimate&);
 void checkParts(const std::string& name, const Scene& scene, uint64_t seeds) {
   const auto rendered = [&](uint64_t spp, SamplerKind sampler, uint64_t seed) {
     Settings settings = clampedSettings(24, 24, spp, sampler, seed);
-    settings.directIndirect = settings.quarters = true;
+    settings.keep.directIndirect = settings.keep.quarters = true;
     return render(scene, settings);
   };
   const RenderResult pilot = rendered(256, SamplerKind::Independent, 1000);

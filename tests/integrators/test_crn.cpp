@@ -99,7 +99,7 @@ TEST_CASE("crn: quarters are independent of each other and of the path tracer") 
   for (uint64_t seed = 0; seed < kSeeds; ++seed) {
     Settings settings = settingsOf("crn", 6, 6, 8, seed);
     settings.threads = 1;
-    settings.quarters = true;
+    settings.keep.quarters = true;
     settings.clamp = 2;
     const RenderResult crn = render(scene, settings);
     settings.integrators = {"pt"};

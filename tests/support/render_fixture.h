@@ -34,7 +34,7 @@ inline Settings settingsFor(int width, int height, uint64_t spp, SamplerKind sam
   s.height = height;
   s.spp = spp;
   s.sampler = sampler;
-  s.features = false;
+  s.keep.features = false;
   return s;
 }
 

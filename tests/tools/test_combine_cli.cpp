@@ -139,7 +139,7 @@ TEST_CASE("A session keeps the variances after 1, 2, 4, … rounds when asked") 
   const Scene scene(cornellBox());
   Settings settings = test::settingsFor(16, 12, 9);
   CHECK(test::render(scene, settings).estimates->history.empty());
-  settings.history = true;
+  settings.keep.history = true;
   const auto nine = test::render(scene, settings).estimates;
   REQUIRE(nine->history.count("pt") == 1);
   const std::vector<Checkpoint>& history = nine->history.at("pt");

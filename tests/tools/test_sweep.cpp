@@ -362,7 +362,7 @@ TEST_CASE("Methods read the features of their own first integrator, whatever els
   mixed.inputs = {{"pt", 1}, {"sppm", 1}};
   other.inputs = {{"bdpt", 1}, {"sppm", 1}};
   vcm.inputs = {{"vcm", 1}};
-  filter.features = mixed.features = other.features = true;
+  filter.buffers.features = mixed.buffers.features = other.buffers.features = true;
   using Groups = std::vector<std::vector<size_t>>;
   CHECK(groupMethods({sppm, bdpt, pt, filter, mixed, other, vcm}, false) == Groups{{0, 2, 3, 4}, {1, 5}, {6}});
   // One that joins two of them without features makes no one of them.

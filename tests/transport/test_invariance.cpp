@@ -126,7 +126,7 @@ void checkCrop(const Scene& scene, const Settings& base, const PixelWindow& wind
 
 Settings withFeatures(int width, int height, uint64_t spp) {
   Settings settings = settingsFor(width, height, spp);
-  settings.features = true;
+  settings.keep.features = true;
   return settings;
 }
 
@@ -216,7 +216,7 @@ TEST_CASE("invariance: a scene a thousand times its size away from the origin is
 TEST_CASE("invariance: leaving nothing out gives the same pixels") {
   const auto check = [](const SceneData& pruned, SceneData full, uint64_t spp) {
     Settings settings = withFeatures(48, 32, spp);
-    settings.quarters = true;
+    settings.keep.quarters = true;
     const RenderResult lean = render(pruned, settings);
     settings.full = true;
     SceneOptions options;

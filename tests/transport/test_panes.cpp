@@ -385,7 +385,7 @@ TEST_CASE("A furnace of panes keeps its radiance") {
 TEST_CASE("Light of a pane's far side counts as direct, however it is found") {
   const Scene scene(glazed(pane(), Light::Lamp));
   Settings s = settingsOf("pt", 16, 12, 256);
-  s.directIndirect = true;
+  s.keep.directIndirect = true;
   s.maxDepth = 2;  // nothing but direct light, and what the mirror and the panes reflect
   const Estimate e = estimateOf(render(scene, s));
   double direct = 0, all = 0;

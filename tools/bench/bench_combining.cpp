@@ -36,7 +36,7 @@ std::vector<std::string> integratorsFor(const std::vector<std::string>& methods)
 nlohmann::json benchCombining(const Scene& scene, const CameraData& camera, Settings settings,
                               const std::vector<std::string>& methods, int repeats) {
   settings.integrators = integratorsFor(methods);
-  settings.features = settings.quarters = settings.history = settings.directIndirect = true;
+  settings.keep = KeptBuffers::everything();
   const auto integrators = makeIntegrators();
   Session session(scene, makePlan(scene, camera, settings, pointersTo(integrators)));
   const std::shared_ptr<const Estimates> estimates = session.run().estimates;

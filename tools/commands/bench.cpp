@@ -133,8 +133,8 @@ nlohmann::json benchScene(const SceneSource& source, const BenchOptions& o, cons
   std::vector<double> renderRates, rawRates, ratios, pathRates, shares, incoherentRates, incoherentRatios;
   uint64_t rayCount = 0;
   withThreads(settings.threads, [&] {
-    PassTarget target(plan.window.width(), plan.window.height(), integrator.splats(), plan.features);
-    Accumulator film(plan.window.width(), plan.window.height(), plan.buckets);
+    PassTarget target(plan.window.width(), plan.window.height(), integrator.splats(), plan.kept.features);
+    Accumulator film(plan.window.width(), plan.window.height(), plan.buckets());
     std::vector<std::vector<RecordedRay>> recorded;
     integrator.renderPass({context, plan, 0, nullptr, nullptr, &recorded}, target);
     std::vector<std::vector<RecordedRay>> shuffled = recorded;
@@ -282,7 +282,7 @@ int runBench(const BenchOptions& o) {
   Settings settings = makeSettings(view, o.samples);
   if (!o.combine.empty()) return runCombiningBench(o, settings);
   if (!o.publish.empty()) return runPublishingBench(o, settings);
-  settings.features = false;
+  settings.keep.features = false;
   const std::vector<SceneSource> sources = sourcesOf(o);
   nlohmann::json all = nlohmann::json::array();
   for (const SceneSource& source : sources) {

@@ -107,10 +107,7 @@ int runPlan(PlanOptions o) {
   checkJobOptions(o);
   if (!o.image.file.empty()) imageFormat(o.image.file);
   Settings settings = makeSettings(o.scene, o.samples);
-  settings.features = o.image.aovSet() != AovSet::None;
-  settings.quarters = o.image.quarters;
-  settings.history = o.image.history;
-  settings.directIndirect = o.image.directIndirect;
+  settings.keep = o.image.buffers();
   settings.transparent = o.transparent;
   if (o.tasks > 0) splitPasses(settings.spp, o.tasks);  // wrong numbers before the scene is loaded
   SceneData data = loadScene(o.scene);

@@ -49,10 +49,7 @@ struct PreviewOptions {
 Settings previewSettings(const PreviewOptions& o) {
   Settings settings = makeSettings(o.scene, o.samples);
   if (o.samples.spp == 0 && o.samples.time.empty()) settings.spp = 0;  // until it is stopped
-  settings.features = o.image.aovSet() != AovSet::None;
-  settings.quarters = o.image.quarters;
-  settings.history = o.image.history;
-  settings.directIndirect = o.image.directIndirect;
+  settings.keep = o.image.buffers();
   return settings;
 }
 

@@ -50,10 +50,7 @@ struct RenderOptions {
 
 Settings renderSettings(const RenderOptions& o) {
   Settings settings = makeSettings(o.scene, o.samples);
-  settings.features = o.image.aovSet() != AovSet::None;
-  settings.quarters = o.image.quarters;
-  settings.history = o.image.history;
-  settings.directIndirect = o.image.directIndirect;
+  settings.keep = o.image.buffers();
   settings.transparent = o.transparent;
   if (o.error > 0 && o.samples.spp == 0 && o.samples.time.empty()) settings.spp = 0;
   if (o.passes.empty()) return settings;
@@ -111,12 +108,13 @@ std::optional<FilmState> earlierState(const RenderOptions& o, const Settings& se
 
 // What an earlier run kept is kept on, whether or not this one's outputs need it.
 void keepAsBefore(const FilmState& state, Settings& settings) {
-  settings.quarters |= state.buckets == 4;
-  settings.features |= state.features.has_value();
+  KeptBuffers& keep = settings.keep;
+  keep.quarters |= state.buckets == 4;
+  keep.features |= state.features.has_value();
   for (const StateOption& option : state.identity.options)
-    settings.history |= option == StateOption{"keeping history", "on"};
-  for (const EstimateState& e : state.estimates) settings.directIndirect |= e.parts.has_value();
-  settings.stops = stopsOf(state.identity);
+    keep.history |= option == StateOption{"keeping history", "on"};
+  for (const EstimateState& e : state.estimates) keep.directIndirect |= e.parts.has_value();
+  keep.stops = stopsOf(state.identity);
 }
 
 nlohmann::json errorOrNull(const std::optional<double>& error) {

@@ -48,13 +48,13 @@ AvailableEstimate plannedEstimate(const PlannedIntegrator& p, uint64_t rounds) {
 
 AvailableEstimates plannedEstimates(const Plan& plan, uint64_t samples) {
   AvailableEstimates available;
-  available.features = plan.features;
+  available.features = plan.kept.features;
   for (const PlannedIntegrator& p : plan.integrators) {
     AvailableEstimate e = plannedEstimate(p, samples);
-    e.quarters = e.quarters && plan.buckets == 4;
-    e.directIndirect = e.directIndirect && plan.directIndirect;
-    if (!plan.settings.history) e.checkpoints = 0;
-    for (const uint64_t stop : plan.settings.stops)
+    e.quarters = e.quarters && plan.kept.quarters;
+    e.directIndirect = e.directIndirect && plan.kept.directIndirect;
+    if (!plan.kept.history) e.checkpoints = 0;
+    for (const uint64_t stop : plan.kept.stops)
       if (e.unbiased && (samples == 0 || stop < e.passes)) e.kept.push_back(stop);
     available.estimates.push_back(std::move(e));
   }
@@ -127,8 +127,7 @@ CombinePlan planCombining(const CombineChoice& choice, uint64_t samples, Plan& p
   available.features = true;
   for (const PlannedIntegrator& p : plan.integrators) available.estimates.push_back(plannedEstimate(p, samples));
   CombinePlan combinePlan = makeCombinePlan(available, choice.wanted(), choice.options().roles);
-  const CombinePlanNeeds needs = needsOf(combinePlan);
-  keepAlso({needs.quarters, needs.features, needs.checkpoints > 0, needs.directIndirect, needs.stops}, plan);
+  keepAlso(buffersOf(combinePlan), plan);
   return combinePlan;
 }
 

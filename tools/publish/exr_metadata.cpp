@@ -102,7 +102,7 @@ Estimates describedEstimates(const FilmState& state, bool quarters, bool timing)
 }
 
 Estimates describedEstimates(const Session& session, bool timing) {
-  return describedEstimates(session.state(), session.plan().settings.quarters, timing);
+  return describedEstimates(session.state(), session.plan().settings.keep.quarters, timing);
 }
 
 std::vector<Attribute> headerAttributes(const Scene& scene, const Session& session, const RenderResult& result,

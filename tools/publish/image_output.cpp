@@ -82,6 +82,11 @@ AovSet ImageOutput::aovSet() const {
   return more ? AovSet::All : AovSet::Features;
 }
 
+KeptBuffers ImageOutput::buffers() const {
+  return {
+      .features = aovSet() != AovSet::None, .quarters = quarters, .history = history, .directIndirect = directIndirect};
+}
+
 ImageOutput ImageOutput::replaceable() const {
   ImageOutput output = *this;
   for (std::string* name : {&output.file, &output.png})

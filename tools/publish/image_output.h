@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "renderer/film/files/exr.h"
+#include "renderer/film/kept_buffers.h"
 #include "tools/options/combining.h"
 
 namespace CLI {
@@ -42,6 +43,8 @@ struct ImageOutput {
   // What --aovs says; nothing said: features, or all where layers that are there only then have been asked for. Throws
   // Error(Usage).
   AovSet aovSet() const;
+  // What the film has to keep for the layers.
+  KeptBuffers buffers() const;
   // Without files that can be written only once: streams.
   ImageOutput replaceable() const;
   // Without denoisers and combiners.

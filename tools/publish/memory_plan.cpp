@@ -63,7 +63,7 @@ MemoryPlan planMemory(const Scene& scene, const Plan& plan, const CombinePlan& c
   const AvailableEstimates available = plannedEstimates(plan, samples);
   const MemoryItem film{"film", pixels * (plan.filmBytesPerPixel + historyBytes(available))};
   // The sums of indirect light are made for its variance.
-  const uint64_t rest = plan.directIndirect ? 24 * static_cast<uint64_t>(plan.buckets) : 0;
+  const uint64_t rest = plan.kept.directIndirect ? 24 * static_cast<uint64_t>(plan.buckets()) : 0;
   const MemoryItem copy{"the copy that is published",
                         pixels * (static_cast<uint64_t>(estimatesMemory(available)) + rest)};
   const int threads = plan.settings.threads > 0 ? plan.settings.threads : machineThreads();

@@ -277,7 +277,7 @@ WrittenImage Publisher::finish() {
   if (last_ && options_.image.replaceable().files().size() == options_.image.files().size()) {
     written = *last_;
   } else if (hasImage()) {
-    Estimates estimates = describedEstimates(film, session_.plan().settings.quarters, !options_.image.noTiming);
+    Estimates estimates = describedEstimates(film, session_.plan().settings.keep.quarters, !options_.image.noTiming);
     const std::optional<Plane<float>> alpha =
         film.coverage ? std::optional(film.coverage->mean()) : std::optional<Plane<float>>();
     film = {};  // what it held is what combiners take

@@ -218,11 +218,7 @@ std::vector<SweepJob> Sweep::jobsOf(const std::string& scene) const {
         cell.seed = job.seed;
         for (size_t i : group) {
           const SweepMethod& method = methods_[i];
-          job.features = job.features || method.features;
-          job.quarters = job.quarters || method.quarters;
-          job.history = job.history || method.history;
-          job.directIndirect = job.directIndirect || method.directIndirect;
-          job.stops.insert(job.stops.end(), method.stops.begin(), method.stops.end());
+          job.buffers |= method.buffers;
           cell.method = method.name;
           for (double rung : l.rungs) {
             cell.mark = rung;

@@ -65,7 +65,8 @@ std::vector<std::vector<size_t>> groupMethods(const std::vector<SweepMethod>& me
     for (size_t i = 0; i < methods.size(); ++i)
       for (size_t j = 0; j < methods.size(); ++j) {
         const SweepMethod &a = methods[i], &b = methods[j];
-        const bool alike = a.features == b.features && (!a.features || a.inputs.front() == b.inputs.front());
+        const bool alike =
+            a.buffers.features == b.buffers.features && (!a.buffers.features || a.inputs.front() == b.inputs.front());
         if (label[j] >= label[i] || !alike || !shareRender(a, b)) continue;
         label[i] = label[j];
         changed = true;
@@ -73,12 +74,13 @@ std::vector<std::vector<size_t>> groupMethods(const std::vector<SweepMethod>& me
   }
   // Whoever reads no features joins the first of the others that shares a render with one of its group.
   for (size_t i = 0; i < methods.size(); ++i) {
-    const auto readsFeatures = [&](size_t j) { return methods[j].features && label[j] == label[i]; };
+    const auto readsFeatures = [&](size_t j) { return methods[j].buffers.features && label[j] == label[i]; };
     bool hosted = false;
     for (size_t j = 0; j < methods.size(); ++j) hosted = hosted || readsFeatures(j);
     if (hosted) continue;
-    const auto host = std::find_if(methods.begin(), methods.end(),
-                                   [&](const SweepMethod& m) { return m.features && shareRender(m, methods[i]); });
+    const auto host = std::find_if(methods.begin(), methods.end(), [&](const SweepMethod& m) {
+      return m.buffers.features && shareRender(m, methods[i]);
+    });
     if (host == methods.end()) continue;
     const size_t from = label[i], to = label[static_cast<size_t>(host - methods.begin())];
     std::replace(label.begin(), label.end(), from, to);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "renderer/film/estimates.h"
+#include "renderer/film/kept_buffers.h"
 #include "renderer/session/integrator.h"
 
 namespace braid {
@@ -36,8 +37,7 @@ struct SweepMethod {
   // The first one is the estimate that the method improves: its passes are the row's spp, and pixels count as better
   // or worse than its mean.
   std::vector<MethodShare> inputs;
-  bool features = false, quarters = false, history = false, directIndirect = false;  // what the estimates must hold
-  std::vector<uint64_t> stops;  // passes at which they keep their image
+  KeptBuffers buffers;  // what the estimates must hold
   std::function<MethodImage(const std::shared_ptr<const Estimates>&, const Rgb<float>& reference)> finish;
 };
 

@@ -86,7 +86,7 @@ class SharedPipeline {
 struct Parsed {
   std::string method;  // in the form of combine plans
   std::vector<MethodShare> inputs;
-  CombinePlanNeeds needs;
+  KeptBuffers buffers;
 };
 
 [[noreturn]] void refuseMethod(const std::string& name, const std::string& reason) {
@@ -156,7 +156,7 @@ Parsed parse(const std::string& name, const Integrators& integrators) {
   const Step* step = combinePlan.find(parsed.method);
   BRAID_ASSERT(step);
   if (!step->skipReason.empty()) refuseMethod(name, step->skipReason);
-  parsed.needs = needsOf(combinePlan);
+  parsed.buffers = buffersOf(combinePlan);
   return parsed;
 }
 
@@ -182,11 +182,7 @@ std::vector<SweepMethod> sweepMethods(const std::vector<std::string>& names, con
     SweepMethod method;
     method.name = name;
     method.inputs = parsed.inputs;
-    method.features = parsed.needs.features;
-    method.quarters = parsed.needs.quarters;
-    method.directIndirect = parsed.needs.directIndirect;
-    method.history = parsed.needs.checkpoints > 0;
-    method.stops = parsed.needs.stops;
+    method.buffers = parsed.buffers;
     method.finish = [pipeline, wanted = parsed.method](const std::shared_ptr<const Estimates>& estimates,
                                                        const Rgb<float>& reference) {
       return pipeline->image(estimates, reference, wanted);

@@ -151,7 +151,7 @@ std::optional<SweepReference> renderReference(const std::string& folder, const S
                                               const std::atomic<bool>* cancel) {
   settings.seed = kReferenceSeed;
   settings.spp += settings.spp % 2;
-  settings.features = false;
+  settings.keep.features = false;
   Session session(scene, makePlan(scene, camera, settings, integrators));
   const RenderResult result = session.run(progress, cancel);
   if (result.reason == StopReason::Cancelled) return {};

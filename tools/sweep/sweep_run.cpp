@@ -76,13 +76,7 @@ Plan planOf(const SweepScene& scene, Settings settings, const SweepJob& job,
   settings.seed = job.seed;
   settings.seconds = 0;
   settings.spp = job.ladder == Ladder::Samples ? static_cast<uint64_t>(job.lastMark()) : 0;
-  settings.features = job.features;
-  settings.quarters = job.quarters;
-  settings.history = job.history;
-  settings.directIndirect = job.directIndirect;
-  settings.stops = job.stops;
-  std::sort(settings.stops.begin(), settings.stops.end());
-  settings.stops.erase(std::unique(settings.stops.begin(), settings.stops.end()), settings.stops.end());
+  settings.keep = job.buffers;
   Plan plan = makePlan(*scene.scene, scene.camera, settings, integrators);
   BRAID_ASSERT(plan.integrators.size() == inputs.size());
   for (size_t i = 0; i < inputs.size(); ++i) plan.integrators[i].passesPerRound = inputs[i].passes;
@@ -147,7 +141,7 @@ std::vector<MethodShare> SweepJob::inputs() const {
   for (const bool reads : {true, false})  // the first integrator makes the features
     for (const Cell& c : cells)
       for (const MethodShare& i : c.method->inputs)
-        if (c.method->features == reads && std::find(inputs.begin(), inputs.end(), i) == inputs.end())
+        if (c.method->buffers.features == reads && std::find(inputs.begin(), inputs.end(), i) == inputs.end())
           inputs.push_back(i);
   return inputs;
 }

@@ -54,8 +54,7 @@ struct SweepJob {
   };
   std::vector<Cell> cells;
   // What the estimates hold: by all methods of the group, done or not, so that a resumed job adds up the same buckets.
-  bool features = false, quarters = false, history = false, directIndirect = false;
-  std::vector<uint64_t> stops;
+  KeptBuffers buffers;
 
   double lastMark() const;
   // Integrators and passes of a round, each integrator once.

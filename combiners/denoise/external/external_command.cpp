@@ -122,7 +122,7 @@ class ExternalCommand : public ExternalMethod {
     Needs needs;
     needs.passes = 1;
     needs.halves = needs.variance = false;
-    needs.features = wantsFeatures();
+    needs.helpful.features = wantsFeatures();
     return needs;
   }
   MethodMemory memory(const MemoryCase& /*of*/) const override { return {84, 36}; }

@@ -52,9 +52,9 @@ class Nfor : public Method {
   Needs needs() const override {
     Needs needs;
     needs.passes = 2;
-    needs.features = needs.featureNoise = true;
+    needs.helpful.features = needs.helpful.featureNoise = true;
     needs.variance = false;
-    needs.quartersHelp = true;
+    needs.helpful.quarters = true;
     return needs;
   }
   MethodMemory memory(const MemoryCase& /*of*/) const override { return {520, 44}; }

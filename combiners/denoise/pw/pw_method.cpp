@@ -44,7 +44,7 @@ class PatchWelch : public Method {
 Needs patchWelchNeeds() {
   Needs needs;
   needs.passes = 2;
-  needs.features = true;
+  needs.helpful.features = true;
   needs.halves = needs.variance = false;
   return needs;
 }

@@ -44,9 +44,9 @@ class Rdfc : public Method {
   Needs needs() const override {
     Needs needs;
     needs.passes = 2;
-    needs.features = needs.featureNoise = true;
+    needs.helpful.features = needs.helpful.featureNoise = true;
     needs.halves = needs.variance = false;
-    needs.quartersHelp = true;
+    needs.helpful.quarters = true;
     return needs;
   }
   MethodMemory memory(const MemoryCase& /*of*/) const override { return {496, 52}; }
