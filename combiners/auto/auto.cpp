@@ -10,11 +10,8 @@
 //   7. estimate the error (half_statistics.h), with the squared bias that the photon maps leave.
 // x itself is no candidate: halves cannot see the error of a firefly in the half that holds it.
 #include <algorithm>
-#include <array>
 
 #include "combiners/shrinkage/debias.h"
-#include "combiners/denoise/pw/pw1_filter.h"
-#include "combiners/denoise/pw/pw_filter.h"
 #include "combiners/statistics/variance.h"
 #include "combiners/statistics/fireflies.h"
 #include "combiners/statistics/half_statistics.h"
@@ -24,6 +21,7 @@
 #include "combiners/pipeline/combine_plan.h"
 #include "combiners/pipeline/registry.h"
 #include "combiners/ensemble/relative_weights.h"
+#include "combiners/auto/auto_filters.h"
 #include "combiners/auto/refilter.h"
 #include "combiners/shrinkage/shrinkage.h"
 
@@ -33,19 +31,11 @@ namespace {
 
 const OptionInfo kPatch{"auto-patch", 15, "Width in pixels of the patches that errors are summed over", 1, 101};
 const OptionInfo kFuse{"auto-fuse", 1, "0: photon maps are bases, not part of the image that is denoised"};
-const OptionInfo kDebias{"auto-debias", 1, "0: photon maps keep the bias that they tell"};
+const OptionInfo kDebias{"auto-debias", 1, "0: photon maps are not corrected by their own bias estimate"};
 const OptionInfo kShrink{"auto-shrink", 1, "0: bases only, without James-Stein shrinkage towards them"};
 const OptionInfo kRefilter{"auto-refilter", 1, "0: the combined image is not filtered once more"};
 const OptionInfo kDirectIndirect{"auto-direct-indirect", 1, "0: direct and indirect light are filtered together"};
 const OptionInfo kFireflies{"auto-remove-fireflies", 1, "0: keep fireflies"};
-
-constexpr uint64_t kFewestPasses = 4;       // fewer: the first filter alone
-constexpr uint64_t kFirstOrderPasses = 64;  // fewer: slopes fit noise
-
-// The careful filter is for what the wide one takes for noise, which is small (combiners/EXPERIMENTS.md, Careful
-// filter).
-constexpr PatchWelchNeighbours kCarefulNeighbours{4, 4};
-constexpr int kFirstOrderStride = 7;  // with a careful filter beside it, fits every fifth pixel change no error either
 
 // What images from filters of direct and indirect light keep of the squared bias that their halves show
 // (combiners/EXPERIMENTS.md, Bias that filters keep): filters blur less as variances fall, but not all bias goes with
@@ -73,70 +63,12 @@ class Auto : public Method {
   MethodResult run(const MethodInputs& in) const override;
 };
 
-Estimate asEstimate(std::vector<Rgb<float>> images, const char* name) {
-  Estimate e;
-  e.name = name;
-  e.mean = std::move(images[0]);
-  for (size_t h = 0; h + 1 < images.size(); ++h) e.half[h] = std::move(images[1 + h]);
-  return e;
-}
-
 MethodMemory Auto::memory(const MemoryCase& of) const {
   const int fused = of.photonMaps > 0 ? 112 : 0, others = of.bases - of.photonMaps;
-  if (of.passes > 0 && of.passes < kFewestPasses) return {48 + fused + 36 * others, 36, 2'300'000};
+  if (of.passes > 0 && of.passes < kAutoFewestPasses) return {48 + fused + 36 * others, 36, 2'300'000};
   const int bases = others + 2;
   const int refilterBytes = 353 + 16 * bases;  // 48 of it a copy without fireflies
   return {std::max(44 + 88 * bases, refilterBytes) + fused, 44 + 8 * bases};
-}
-
-// Whether errors can be measured across halves. Images of other renderers may not say their passes.
-bool mayBeMeasured(const Estimate& x) { return x.passes == 0 || x.passes >= kFewestPasses; }
-
-// The filters of x, fewer once cancelled: a wide one, from 64 passes on its first-order fit instead, and last a careful
-// one that takes no neighbour's noise for its own.
-std::vector<Estimate> filtersOf(const Estimate& x, const Features* features, const std::atomic<bool>* cancel) {
-  const auto cancelled = [&] { return cancel && cancel->load(); };
-  std::vector<Estimate> bases;
-  if (cancelled()) return bases;
-  {
-    const PatchWelchInput input = patchWelchInput(x, features);
-    if (input.variance.empty()) return bases;
-    if (!mayBeMeasured(x)) {
-      bases.push_back(
-          asEstimate(std::move(patchWelch(input, std::array{kPatchWelchThreshold}, {}, {}, cancel)[0]), "pw"));
-      return bases;
-    }
-    const bool firstOrder = x.passes >= kFirstOrderPasses;
-    FirstOrderOptions fits;
-    fits.stride = kFirstOrderStride;
-    auto wide = firstOrder ? patchWelchFirstOrder(input, fits, cancel)
-                           : std::move(patchWelch(input, std::array{kPatchWelchWideThreshold}, {}, {}, cancel)[0]);
-    if (cancelled()) return bases;
-    bases.push_back(asEstimate(std::move(wide), firstOrder ? "pw1" : "pw-wide"));
-  }
-  if (cancelled()) return bases;
-  const PatchWelchInput robust = patchWelchInput(x, features, true);
-  auto careful = patchWelch(robust, std::array{kPatchWelchThreshold}, kCarefulNeighbours, {}, cancel);
-  bases.push_back(asEstimate(std::move(careful[0]), "pw-robust"));
-  return bases;
-}
-
-// The same filters of direct and of indirect light, added up.
-std::vector<Estimate> filtersOfParts(const Estimate& x, bool removeFireflies, const Features* features,
-                                     const std::atomic<bool>* cancel) {
-  std::vector<Estimate> sums;
-  for (Estimate (*part)(const Estimate&) : {directLight, indirectLight}) {
-    Estimate light = part(x);
-    if (removeFireflies) {
-      const std::vector<Firefly> fireflies = findFireflies(light, {}, features);
-      for (Rgb<float>* image : {&light.mean, &light.half[0], &light.half[1]}) replaceValues(*image, fireflies);
-      replaceVariances(light.variance, fireflies);
-    }
-    std::vector<Estimate> filtered = filtersOf(light, features, cancel);
-    for (size_t i = 0; i < sums.size() && i < filtered.size(); ++i) addImage(sums[i], filtered[i]);
-    if (sums.empty()) sums = std::move(filtered);
-  }
-  return sums;
 }
 
 // The outside base as a filter of x: a denoiser that has seen the unbiased image alone is run again.
@@ -190,7 +122,7 @@ std::vector<Estimate> shrunkTowards(const std::vector<Estimate>& bases, const Es
 // The image of a result filtered once more, as far as the halves of x ask for it. Its planes are the weights so far.
 void filterAgain(const Estimate& x, const MethodInputs& in, int patchRadius, MethodResult& result) {
   const Estimate first = std::move(result.image), second = refilter(first, in.features, passesOf(x), in.cancel);
-  if (in.cancel && in.cancel->load()) return;
+  if (in.cancelled()) return;
   const std::vector<const Estimate*> both = {&second, &first};
   const WeightMaps shares = relativeWeights(x, both, first.mean, x.variance, in.features, patchRadius);
   result.image = weightedEstimate(shares, both);
@@ -224,77 +156,133 @@ FusedEstimate fusedWith(std::vector<const Estimate*> photonMaps, const MethodInp
   return fusedEstimate(*in.unbiased, photonMaps, in.features);
 }
 
-MethodResult Auto::run(const MethodInputs& in) const {
-  MethodResult result;
-  std::vector<const Estimate*> photonMaps, others;
-  for (const Estimate* b : in.bases)
-    (!b->bias.empty() && in.options.number(kFuse) != 0 ? photonMaps : others).push_back(b);
-  FusedEstimate fused;
-  if (!photonMaps.empty()) fused = fusedWith(photonMaps, in);
-  Estimate* own =
-      photonMaps.empty() ? in.consumable : &fused.image;  // the unbiased or fused image, if it may be changed
-  Estimate copy;
-  const auto changeable = [&](const Estimate& e) -> Estimate& {
-    if (!own) own = &(copy = filterInput(e));
-    return *own;
-  };
-  const Estimate* whole = photonMaps.empty() ? in.unbiased : &fused.image;
-  if (mayBeMeasured(*whole) && whole->variance.empty()) {
-    whole = &changeable(*whole);
-    if (own->variance.empty()) own->variance = meanVariance(*whole);
+// One run: what its steps leave to each other.
+class AutoRun {
+ public:
+  explicit AutoRun(const MethodInputs& in) : in_(in), x_(in.unbiased), changeable_(in.consumable) {}
+  MethodResult run();
+
+ private:
+  void fuse();
+  void filterParts();
+  void removeFireflies();
+  void filter();
+  void shrink();
+  void combine();
+  void refilterCombined();
+  void estimateError();
+
+  bool isOn(const OptionInfo& option) const { return in_.options.number(option) != 0; }
+  bool removesFireflies() const { return isOn(kFireflies) && mayBeMeasured(*x_); }
+  int patchRadius() const { return static_cast<int>(std::clamp(in_.options.number(kPatch), 1.0, 101.0)) / 2; }
+  // x, from now on an image that may be changed.
+  Estimate& changeableX();
+
+  const MethodInputs& in_;
+  const Estimate* x_;     // the unbiased image, or the fused one
+  Estimate* changeable_;  // the same, or null
+  Estimate copy_;         // where it must not be changed
+  bool isFused_ = false;
+  FusedEstimate fused_;
+  std::vector<const Estimate*> others_;  // images that a user named, and photon maps that are not fused
+  double biasKept_ = 1;
+  std::vector<Estimate> filters_, shrunk_;
+  MethodResult result_;
+};
+
+MethodResult AutoRun::run() {
+  fuse();
+  filterParts();  // of x with its fireflies, which parts lose by themselves
+  removeFireflies();
+  filter();
+  if (in_.cancelled()) return std::move(result_);
+  if (filters_.empty() || !mayBeMeasured(*x_)) {
+    result_.image = filters_.empty() ? *x_ : std::move(filters_.back());
+    return std::move(result_);
   }
-  const bool removeFireflies = in.options.number(kFireflies) != 0 && mayBeMeasured(*whole);
-  std::vector<Estimate> filters;  // of the parts, before fireflies of the whole are replaced
-  if (photonMaps.empty() && in.options.number(kDirectIndirect) != 0 && mayBeMeasured(*whole) &&
-      hasDirectIndirect(*whole))
-    filters = filtersOfParts(*whole, removeFireflies, in.features, in.cancel);
-  const double biasKept = filters.empty() ? 1 : kBiasKeptByParts;
-  if (removeFireflies) {
-    const GivenQuarters quarters = photonMaps.empty() ? in.quarters : GivenQuarters{&fused.image.quarter};
-    const std::vector<Firefly> fireflies = findFireflies(*whole, quarters, in.features);
-    result.remarks.push_back(countRemark("removedFireflies", fireflies.size()));
-    if (!fused.noise.empty()) replaceVariances(fused.noise, fireflies);
-    if (!fireflies.empty()) {
-      Estimate& clean = changeable(*whole);
-      for (Rgb<float>* image : {&clean.mean, &clean.half[0], &clean.half[1]}) replaceValues(*image, fireflies);
-      replaceVariances(clean.variance, fireflies);
-      whole = &clean;
-    }
+  shrink();
+  if (!in_.cancelled()) combine();
+  if (!in_.cancelled()) refilterCombined();
+  if (!in_.cancelled()) estimateError();
+  return std::move(result_);
+}
+
+Estimate& AutoRun::changeableX() {
+  if (!changeable_) changeable_ = &(copy_ = filterInput(*x_));
+  x_ = changeable_;
+  return *changeable_;
+}
+
+void AutoRun::fuse() {
+  std::vector<const Estimate*> photonMaps;
+  for (const Estimate* b : in_.bases) (!b->bias.empty() && isOn(kFuse) ? photonMaps : others_).push_back(b);
+  if (!photonMaps.empty()) {
+    isFused_ = true;
+    fused_ = fusedWith(photonMaps, in_);
+    x_ = changeable_ = &fused_.image;
   }
-  const Estimate& x = *whole;
-  std::vector<Estimate> bases;
-  for (const Estimate* b : others) bases.push_back(consistentHalves(baseOf(*b, x, !photonMaps.empty(), in)));
-  if (filters.empty()) filters = filtersOf(x, in.features, in.cancel);
-  for (Estimate& e : filters) bases.push_back(std::move(e));
-  filters.clear();
-  const auto cancelled = [&] { return in.cancel && in.cancel->load(); };
-  if (cancelled()) return result;
-  if (bases.empty() || !mayBeMeasured(x)) {
-    result.image = bases.empty() ? x : std::move(bases.back());
-    return result;
-  }
-  std::vector<Estimate> shrunk;
-  if (in.options.number(kShrink) != 0) shrunk = shrunkTowards(bases, x, in.cancel);
-  if (cancelled()) return result;
+  if (!mayBeMeasured(*x_) || !x_->variance.empty()) return;
+  Estimate& x = changeableX();
+  if (x.variance.empty()) x.variance = meanVariance(x);
+}
+
+void AutoRun::filterParts() {
+  if (isFused_ || !isOn(kDirectIndirect) || !mayBeMeasured(*x_) || !hasDirectIndirect(*x_)) return;
+  filters_ = autoFiltersOfParts(*x_, removesFireflies(), in_.features, in_.cancel);
+  if (!filters_.empty()) biasKept_ = kBiasKeptByParts;
+}
+
+void AutoRun::removeFireflies() {
+  if (!removesFireflies()) return;
+  const GivenQuarters quarters = isFused_ ? GivenQuarters{&fused_.image.quarter} : in_.quarters;
+  const std::vector<Firefly> fireflies = findFireflies(*x_, quarters, in_.features);
+  result_.remarks.push_back(countRemark("removedFireflies", fireflies.size()));
+  if (fireflies.empty()) return;
+  if (!fused_.noise.empty()) replaceVariances(fused_.noise, fireflies);
+  Estimate& x = changeableX();
+  for (Rgb<float>* image : {&x.mean, &x.half[0], &x.half[1]}) replaceValues(*image, fireflies);
+  replaceVariances(x.variance, fireflies);
+}
+
+// Images that a user named go first: the last filter is the careful one, whose image guides the weights.
+void AutoRun::filter() {
+  std::vector<Estimate> own = std::move(filters_);
+  filters_.clear();
+  for (const Estimate* b : others_) filters_.push_back(consistentHalves(baseOf(*b, *x_, isFused_, in_)));
+  if (own.empty()) own = autoFilters(*x_, in_.features, in_.cancel);
+  for (Estimate& e : own) filters_.push_back(std::move(e));
+}
+
+void AutoRun::shrink() {
+  if (isOn(kShrink)) shrunk_ = shrunkTowards(filters_, *x_, in_.cancel);
+}
+
+void AutoRun::combine() {
   std::vector<const Estimate*> candidates;
-  for (const Estimate& e : shrunk) candidates.push_back(&e);
-  for (const Estimate& e : bases) candidates.push_back(&e);
-  const int patchRadius = static_cast<int>(std::clamp(in.options.number(kPatch), 1.0, 101.0)) / 2;
-  const WeightMaps weights = relativeWeights(x, candidates, bases.back().mean, x.variance, in.features, patchRadius);
-  if (cancelled()) return result;
-  result.image = weightedEstimate(weights, candidates);
+  for (const Estimate& e : shrunk_) candidates.push_back(&e);
+  for (const Estimate& e : filters_) candidates.push_back(&e);
+  const WeightMaps weights =
+      relativeWeights(*x_, candidates, filters_.back().mean, x_->variance, in_.features, patchRadius());
+  if (in_.cancelled()) return;
+  result_.image = weightedEstimate(weights, candidates);
   std::vector<Plane<float>> maps = channelMeans(weights);
   for (size_t b = 0; b < candidates.size(); ++b)
-    result.aovs.push_back({"weight.auto." + layerName(candidates[b]->name), std::move(maps[b])});
-  shrunk.clear();  // their memory is what the second pass and the error map need
-  bases.clear();
-  if (in.options.number(kRefilter) != 0) filterAgain(x, in, patchRadius, result);
-  if (cancelled()) return result;
-  result.error =
-      errorMap(result.image.half, x, fused.noise.empty() ? x.variance : fused.noise, result.image.mean, true, biasKept);
-  if (!fused.squaredBias.empty()) addTo(result.error, smoothedSquaredBias(fused.squaredBias, result.image.mean));
-  return result;
+    result_.aovs.push_back({"weight.auto." + layerName(candidates[b]->name), std::move(maps[b])});
+  shrunk_.clear();  // their memory is what the second pass and the error map need
+  filters_.clear();
 }
+
+void AutoRun::refilterCombined() {
+  if (isOn(kRefilter)) filterAgain(*x_, in_, patchRadius(), result_);
+}
+
+void AutoRun::estimateError() {
+  const Rgb<float>& noise = fused_.noise.empty() ? x_->variance : fused_.noise;
+  result_.error = crossHalfErrorMap(result_.image.half, *x_, noise, result_.image.mean, {true, biasKept_});
+  if (!fused_.squaredBias.empty()) addTo(result_.error, smoothedSquaredBias(fused_.squaredBias, result_.image.mean));
+}
+
+MethodResult Auto::run(const MethodInputs& in) const { return AutoRun(in).run(); }
 
 }  // namespace
 

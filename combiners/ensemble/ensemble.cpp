@@ -97,7 +97,7 @@ MethodResult Ensemble::run(const MethodInputs& in) const {
       weights = filteredWeights(weights, weightedEstimate(weights, in.bases), in.features);
   }
   result.image = weightedEstimate(weights, in.bases);
-  result.error = errorMap(result.image.half, *in.unbiased, meanVariance(*in.unbiased), result.image.mean);
+  result.error = crossHalfErrorMap(result.image.half, *in.unbiased, meanVariance(*in.unbiased), result.image.mean);
   std::vector<Plane<float>> maps = channelMeans(weights);
   for (size_t b = 0; b < in.bases.size(); ++b) {
     const std::string& base = in.bases[b]->name;

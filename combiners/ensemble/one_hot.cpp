@@ -154,7 +154,7 @@ Needs oneHotNeeds() {
 MethodResult oneHotResult(const MethodInputs& in, const WeightMaps& weights, const char* method) {
   MethodResult result;
   result.image = weightedEstimate(weights, in.bases);
-  result.error = errorMap(result.image.half, *in.unbiased, meanVariance(*in.unbiased), result.image.mean);
+  result.error = crossHalfErrorMap(result.image.half, *in.unbiased, meanVariance(*in.unbiased), result.image.mean);
   for (size_t b = 0; b < in.bases.size(); ++b) {
     const std::string& base = in.bases[b]->name;
     result.aovs.push_back({std::string("weight.") + method + "." + (base.empty() ? std::to_string(b) : layerName(base)),

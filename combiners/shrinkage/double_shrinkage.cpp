@@ -10,20 +10,18 @@
 #include "combiners/shrinkage/double_shrinkage.h"
 
 #include <algorithm>
-#include <limits>
+#include <cmath>
 #include <utility>
 
 #include "combiners/shrinkage/debias.h"
 #include "combiners/statistics/fireflies.h"
 #include "combiners/statistics/half_statistics.h"
 #include "combiners/pixels/finite_float.h"
-#include "combiners/statistics/surface_smooth.h"
-#include "combiners/shrinkage/optimised_bias.h"
-#include "combiners/shrinkage/radiance_prior.h"
-#include "combiners/regression/regression_features.h"
+#include "combiners/shrinkage/double_shrinkage_prior.h"
 #include "combiners/pipeline/registry.h"
 #include "combiners/ensemble/relative_weights.h"
 #include "combiners/shrinkage/shrinkage.h"
+#include "combiners/shrinkage/shrinkage_errors.h"
 #include "renderer/core/parallel.h"
 
 namespace braid {
@@ -44,7 +42,7 @@ const OptionInfo kFireflies{
     "double-shrinkage-remove-fireflies", 1,
     "1: take out fireflies of a photon map that one or two quarters alone speak for; 0: the paper"};
 const OptionInfo kDebias{"double-shrinkage-debias", 1,
-                         "1: take the bias from a photon map that it tells; 0: the paper"};
+                         "1: correct a photon map by its own bias estimate; 0: the paper"};
 const OptionInfo kMeasured{
     "double-shrinkage-measured", 1,
     "1: a photon map's bias, and light that the unbiased image lacks, are what they show to be; 0: the paper"};
@@ -53,7 +51,6 @@ const OptionInfo kFused{"double-shrinkage-fused", 1,
 const OptionInfo kChosen{"double-shrinkage-chosen", 1,
                          "1: take the prior where halves show it to be of use; 0: everywhere (paper)"};
 
-constexpr int kRadius = 6;        // of the filter of the biased image's variance
 constexpr int kChoiceRadius = 7;  // of the patches that show whether the prior is of use
 
 // a + weight (b - a), not below 0.
@@ -68,24 +65,6 @@ Rgb<float> blend(const Rgb<float>& a, const Rgb<float>& b, const Plane<float>& w
       }
   });
   return out;
-}
-
-Plane<float> channelSum(const Rgb<float>& image, double scale) {
-  Plane<float> out(image.width(), image.height());
-  parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i)
-      out[i] = finiteFloat(scale * (static_cast<double>(image[0][i]) + static_cast<double>(image[1][i]) +
-                                    static_cast<double>(image[2][i])));
-  });
-  return out;
-}
-
-// Variance of the biased image for the weights of the prior. A denoiser brings none; (A - B)² / 4 has one degree of
-// freedom a pixel and is smoothed.
-Plane<float> biasedVariance(const Estimate& biased, const Features* features) {
-  Plane<float> sum = channelSum(meanVariance(biased), 1);
-  if (!biased.variance.empty()) return sum;
-  return std::move(surfaceSmooth({&sum}, features, kRadius)[0]);
 }
 
 // Of both images by their weights: means, halves where there are any, and the variance of the mean.
@@ -120,64 +99,6 @@ Plane<float> errorOfMean(const Plane<float>& ofX, const Plane<float>& ofY, const
     out[i] = finiteFloat(sqr(1 - static_cast<double>(share[i])) * static_cast<double>(ofX[i]) +
                          sqr(static_cast<double>(share[i])) * static_cast<double>(ofY[i]));
   return out;
-}
-
-// What the prior is fitted to beside the biased image, its variance and its squared error.
-struct PriorInput {
-  const Estimate* x;
-  const Rgb<float>* variance;
-  Plane<float> error;
-};
-
-// The prior of all samples and those of the halves, each by a fit of its own. `first` is the first shrinkage: what the
-// prior falls back to. No pixel of the mean is made of the halves' priors, which measure how good the prior is: their
-// models may stand twice as far apart (combiners/EXPERIMENTS.md, Models of the halves' priors).
-Estimate ownFits(const MethodInputs& in, const PriorInput& of, const Estimate& first, int stride,
-                 RegressionReport& report) {
-  const Estimate &x = *of.x, &y = *in.biased;
-  const Plane<float> noise = biasedVariance(y, in.features);
-  const auto fit = [&](const Rgb<float>& unbiased, const Rgb<float>& biased, const Rgb<float>& fallback,
-                       Samples samples) {
-    const float scale = samples == Samples::All ? 1.0f : 2.0f;  // a half has twice the variance
-    const Plane<float> ofUnbiased = channelSum(*of.variance, static_cast<double>(scale));
-    Plane<float> ofBiased = noise;
-    for (float& v : ofBiased.data) v = std::min(v, std::numeric_limits<float>::max() / 2) * scale;
-    const RegressionFeatures features(in.features, samples);
-    const RegressionSettings settings = stridedSettings(samples == Samples::All ? stride : 2 * stride, in.cancel);
-    return radiancePrior({&unbiased, &ofUnbiased}, {&biased, &ofBiased}, features.groups(), fallback, settings,
-                         &report);
-  };
-  Estimate prior;
-  prior.mean = fit(x.mean, y.mean, first.mean, Samples::All);
-  prior.half[0] = fit(x.half[0], y.half[0], first.half[0], Samples::HalfA);
-  prior.half[1] = fit(x.half[1], y.half[1], first.half[1], Samples::HalfB);
-  return prior;
-}
-
-Estimate makePrior(const MethodInputs& in, const PriorInput& of, const Estimate& first, MethodResult& result) {
-  const Estimate &x = *of.x, &y = *in.biased;
-  const int stride = static_cast<int>(std::clamp(in.options.number(kStride), 1.0, 64.0));
-  const RegressionSettings settings = stridedSettings(stride, in.cancel);
-  Estimate prior;
-  RegressionReport report;
-  if (in.options.number(kPrior) == 1) {
-    OptimisedBias fit = optimisedBias(x, y, in.features, settings);
-    prior.mean = fit.mean();
-    for (int h = 0; h < 2; ++h) prior.half[h] = std::move(fit.own[h]);
-    report = fit.report;
-  } else if (in.options.number(kOwnHalves) != 0) {
-    prior = ownFits(in, of, first, stride, report);
-  } else {
-    const Plane<float> ofUnbiased = channelSum(*of.variance, 1), ofBiased = biasedVariance(y, in.features);
-    const RegressionFeatures features(in.features, Samples::All);
-    auto halves = radiancePriorHalves({&x.mean, &ofUnbiased, {&x.half[0], &x.half[1]}},
-                                      {&y.mean, &ofBiased, {&y.half[0], &y.half[1]}}, features.groups(),
-                                      {first.half[0], first.half[1]}, settings, &report);
-    prior.mean = average(halves[0], halves[1]);
-    for (size_t h = 0; h < 2; ++h) prior.half[h] = std::move(halves[h]);
-  }
-  result.remarks.push_back(report.attribute("double-shrinkage-regression"));
-  return prior;
 }
 
 constexpr float kFireflyVariance = 1.0f / 25;  // of the variance of a firefly that was replaced
@@ -277,7 +198,7 @@ void chooseBetween(Estimate& second, const Estimate& first, const Features* feat
 // light than the unbiased image, plus what the photon map says of its bias, which all halves share.
 Plane<float> estimatedError(const Estimate& out, const Estimate& first, const Plane<float>& toBiased,
                             Plane<float>& squaredBias) {
-  Plane<float> error = errorMap(out.half, first, first.variance, out.mean);
+  Plane<float> error = crossHalfErrorMap(out.half, first, first.variance, out.mean);
   for (size_t i = 0; i < error.size(); ++i) squaredBias[i] *= toBiased[i] * toBiased[i];
   const Plane<float> bias = smoothedSquaredBias(squaredBias, out.mean);
   for (size_t i = 0; i < error.size(); ++i)
@@ -285,65 +206,124 @@ Plane<float> estimatedError(const Estimate& out, const Estimate& first, const Pl
   return error;
 }
 
-MethodResult DoubleShrinkageMethod::run(const MethodInputs& given) const {
-  Rgb<float> variance = meanVariance(*given.unbiased);
-  MethodInputs in = given;
-  Estimate clean, cleanMap;
-  if (!given.biased->bias.empty()) {
-    cleanMap = prepared(given);
-    in.biased = &cleanMap;
-  }
-  const Estimate& y = *in.biased;
-  if (in.options.number(kGate) != 0 && hasHalves(*given.unbiased) && hasHalves(y)) {
-    clean = withoutFireflies(*given.unbiased, y, variance);
-    in.unbiased = &clean;
-  }
-  const Estimate& x = *in.unbiased;
-  const bool halves = hasHalves(x) && hasHalves(y), measured = in.options.number(kMeasured) != 0;
-  Plane<float> errorU = unbiasedError(x, variance), errorB = biasedError(y, x, variance, in.features, measured), errorP;
-  if (measured && !y.bias.empty()) countMissingLight(errorU, x, variance, y, errorB);
-  Plane<float> squaredBias;
-  if (!y.bias.empty()) squaredBias = squaredBiasSamples(y);
-  cleanMap.bias = cleanMap.biasVariance = Rgb<float>();  // read no more
-  Maps maps(errorU, errorB, errorP);
-  MethodResult result;
-  Estimate& out = result.image;
-  out = meanOf(x, variance, y, maps.toBiased);
-  out.unbiased = false;
+// One run: what its steps leave to each other.
+class DoubleShrinkageRun {
+ public:
+  explicit DoubleShrinkageRun(const MethodInputs& given)
+      : given_(given), in_(given), variance_(meanVariance(*given.unbiased)) {}
+  MethodResult run();
 
-  // Without halves nothing shows how good a prior is.
-  if (halves && in.options.number(kStage) >= 2 && in.options.number(kPrior) < 2) {
-    const Estimate first = std::move(out);
-    PriorInput of = {&x, &variance, errorU};
-    Estimate trusted;
-    if (in.options.number(kFused) != 0 && !squaredBias.empty()) {
-      const Plane<float> share = fourthPower(maps.toBiased);
-      trusted = meanOf(x, variance, y, share);
-      of = {&trusted, &trusted.variance, errorOfMean(errorU, errorB, share)};
-    }
-    Estimate prior = makePrior(in, of, first, result);
-    errorP = priorError(prior.mean, prior.half, *of.x, *of.variance, of.error);
-    maps = Maps(errorU, errorB, errorP);
-    out = towards(prior, first, maps.toPrior);
-    if (in.options.number(kChosen) != 0) chooseBetween(out, first, in.features);
-    if (!squaredBias.empty()) result.error = estimatedError(out, first, maps.toBiased, squaredBias);
-    const char* const channels[3] = {"R", "G", "B"};
-    for (size_t c = 0; c < 3; ++c)
-      result.aovs.push_back({std::string("prior.double-shrinkage.") + channels[c], std::move(prior.mean[c])});
-    result.aovs.push_back({"eta2.double-shrinkage", std::move(errorP)});
+ private:
+  void cleanInputs();
+  void measureErrors();
+  // The second shrinkage, of the image of the first.
+  void shrinkTowardsPrior(Maps& maps);
+  Estimate priorOf(const PriorInput& of, const Estimate& first);
+  void addPlane(const char* name, Plane<float> plane) {
+    result_.aovs.push_back({std::string(name) + ".double-shrinkage", std::move(plane)});
   }
-  out.variance = Rgb<float>();  // it is not that of the prior's part
-  result.aovs.push_back({"kappa1.double-shrinkage", std::move(maps.toBiased)});
-  result.aovs.push_back({"kappa2.double-shrinkage", std::move(maps.toPrior)});
-  result.aovs.push_back({"error-unbiased.double-shrinkage", std::move(errorU)});
-  result.aovs.push_back({"error-biased.double-shrinkage", std::move(errorB)});
-  if (result.error.empty())
-    result.error = halves ? errorMap(out.half, *given.unbiased, meanVariance(*given.unbiased), out.mean)
-                          : std::move(maps.variance);
-  return result;
+
+  bool isOn(const OptionInfo& option) const { return in_.options.number(option) != 0; }
+  const Estimate& x() const { return *in_.unbiased; }
+  const Estimate& y() const { return *in_.biased; }
+  bool halves() const { return hasHalves(x()) && hasHalves(y()); }
+  // Without halves nothing shows how good a prior is.
+  bool hasPrior() const { return halves() && in_.options.number(kStage) >= 2 && in_.options.number(kPrior) < 2; }
+
+  const MethodInputs& given_;
+  MethodInputs in_;      // what is combined
+  Rgb<float> variance_;  // of x
+  Estimate clean_, cleanMap_;
+  Plane<float> errorU_, errorB_, squaredBias_;  // the last one of a photon map only
+  MethodResult result_;
+};
+
+void DoubleShrinkageRun::cleanInputs() {
+  if (!given_.biased->bias.empty()) {
+    cleanMap_ = prepared(given_);
+    in_.biased = &cleanMap_;
+  }
+  if (!isOn(kGate) || !halves()) return;
+  clean_ = withoutFireflies(x(), y(), variance_);
+  in_.unbiased = &clean_;
 }
 
+void DoubleShrinkageRun::measureErrors() {
+  const bool measured = isOn(kMeasured);
+  errorU_ = unbiasedError(x(), variance_);
+  errorB_ = biasedError(y(), x(), variance_, in_.features, measured);
+  if (y().bias.empty()) return;
+  if (measured) countMissingLight(errorU_, x(), variance_, y(), errorB_);
+  squaredBias_ = squaredBiasSamples(y());
+  cleanMap_.bias = cleanMap_.biasVariance = Rgb<float>();  // read no more
+}
+
+Estimate DoubleShrinkageRun::priorOf(const PriorInput& of, const Estimate& first) {
+  PriorChoice choice;
+  choice.optimisedBias = in_.options.number(kPrior) == 1;
+  choice.ownHalves = isOn(kOwnHalves);
+  choice.stride = static_cast<int>(std::clamp(in_.options.number(kStride), 1.0, 64.0));
+  RegressionReport report;
+  Estimate prior = doubleShrinkagePrior(in_, of, first, choice, report);
+  result_.remarks.push_back(report.attribute("double-shrinkage-regression"));
+  return prior;
+}
+
+void DoubleShrinkageRun::shrinkTowardsPrior(Maps& maps) {
+  Estimate& out = result_.image;
+  const Estimate first = std::move(out);
+  PriorInput of = {&x(), &variance_, errorU_};
+  Estimate trusted;
+  if (isOn(kFused) && !squaredBias_.empty()) {
+    const Plane<float> share = fourthPower(maps.toBiased);
+    trusted = meanOf(x(), variance_, y(), share);
+    of = {&trusted, &trusted.variance, errorOfMean(errorU_, errorB_, share)};
+  }
+  Estimate prior = priorOf(of, first);
+  Plane<float> errorP = priorError(prior.mean, prior.half, *of.x, *of.variance, of.error);
+  maps = Maps(errorU_, errorB_, errorP);
+  out = towards(prior, first, maps.toPrior);
+  if (isOn(kChosen)) chooseBetween(out, first, in_.features);
+  if (!squaredBias_.empty()) result_.error = estimatedError(out, first, maps.toBiased, squaredBias_);
+  const char* const channels[3] = {"R", "G", "B"};
+  for (size_t c = 0; c < 3; ++c)
+    result_.aovs.push_back({std::string("prior.double-shrinkage.") + channels[c], std::move(prior.mean[c])});
+  addPlane("eta2", std::move(errorP));
+}
+
+MethodResult DoubleShrinkageRun::run() {
+  cleanInputs();
+  measureErrors();
+  Maps maps(errorU_, errorB_, {});
+  Estimate& out = result_.image;
+  out = meanOf(x(), variance_, y(), maps.toBiased);
+  out.unbiased = false;
+  if (hasPrior()) shrinkTowardsPrior(maps);
+  out.variance = Rgb<float>();  // it is not that of the prior's part
+  addPlane("kappa1", std::move(maps.toBiased));
+  addPlane("kappa2", std::move(maps.toPrior));
+  addPlane("error-unbiased", std::move(errorU_));
+  addPlane("error-biased", std::move(errorB_));
+  if (result_.error.empty())
+    result_.error = halves() ? crossHalfErrorMap(out.half, *given_.unbiased, meanVariance(*given_.unbiased), out.mean)
+                             : std::move(maps.variance);
+  return std::move(result_);
+}
+
+MethodResult DoubleShrinkageMethod::run(const MethodInputs& in) const { return DoubleShrinkageRun(in).run(); }
+
 }  // namespace
+
+DoubleShrinkage doubleShrinkage(double unbiasedError, double biasedError, double priorError) {
+  DoubleShrinkage s;
+  const double sum = unbiasedError + biasedError;
+  s.toBiased = std::isinf(unbiasedError) ? 1.0 : sum > 0 ? unbiasedError / sum : 0.0;
+  const double h = std::isinf(unbiasedError) ? biasedError : s.toBiased * biasedError;
+  const double harmonic = std::isinf(biasedError) ? unbiasedError : h;
+  s.toPrior = std::isinf(priorError) ? 0.0 : harmonic + priorError > 0 ? harmonic / (harmonic + priorError) : 0.0;
+  s.variance = std::isinf(priorError) ? harmonic : s.toPrior * priorError;
+  return s;
+}
 
 std::unique_ptr<Method> make_double_shrinkage() { return std::make_unique<DoubleShrinkageMethod>(); }
 

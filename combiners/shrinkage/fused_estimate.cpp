@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "combiners/pixels/channel_mean.h"
-#include "combiners/shrinkage/double_shrinkage.h"
+#include "combiners/shrinkage/shrinkage_errors.h"
 #include "combiners/ensemble/ensemble_weights.h"
 #include "combiners/statistics/half_statistics.h"
 #include "combiners/pixels/finite_float.h"

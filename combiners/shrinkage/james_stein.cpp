@@ -180,7 +180,7 @@ MethodResult JamesStein::run(const MethodInputs& in) const {
                          ? ShrunkImage{average(out.half[0], out.half[1]), average(shrunk[0].factor, shrunk[1].factor)}
                          : shrink(x.mean, variance, scale, targets.mean);
   out.mean = std::move(full.image);
-  if (halves && !crossed) result.error = errorMap(out.half, x, variance, out.mean);
+  if (halves && !crossed) result.error = crossHalfErrorMap(out.half, x, variance, out.mean);
   const char* const channels[3] = {"R", "G", "B"};
   for (size_t c = 0; c < 3; ++c)
     result.aovs.push_back({std::string("shrinkage.js.") + channels[c], std::move(full.factor[c])});

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "combiners/shrinkage/shrinkage_errors.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include "combiners/pixels/box_mean.h"
-#include "combiners/shrinkage/double_shrinkage.h"
 #include "combiners/statistics/half_statistics.h"
 #include "combiners/pixels/channel_mean.h"
 #include "combiners/pixels/finite_float.h"
@@ -79,17 +80,6 @@ Plane<float> withoutFireflies(const Plane<float>& variance) {
 }
 
 }  // namespace
-
-DoubleShrinkage doubleShrinkage(double unbiasedError, double biasedError, double priorError) {
-  DoubleShrinkage s;
-  const double sum = unbiasedError + biasedError;
-  s.toBiased = std::isinf(unbiasedError) ? 1.0 : sum > 0 ? unbiasedError / sum : 0.0;
-  const double h = std::isinf(unbiasedError) ? biasedError : s.toBiased * biasedError;
-  const double harmonic = std::isinf(biasedError) ? unbiasedError : h;
-  s.toPrior = std::isinf(priorError) ? 0.0 : harmonic + priorError > 0 ? harmonic / (harmonic + priorError) : 0.0;
-  s.variance = std::isinf(priorError) ? harmonic : s.toPrior * priorError;
-  return s;
-}
 
 Plane<float> unbiasedError(const Estimate& unbiased, const Rgb<float>& variance) {
   Plane<float> error = boxed(channelMean(variance));

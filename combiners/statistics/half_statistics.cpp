@@ -85,8 +85,9 @@ Plane<float> squaredErrorSamples(const Rgb<float> (&halves)[2], const Estimate& 
   });
 }
 
-Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
-                      const Rgb<float>& guide, bool follows, double kept) {
+Plane<float> crossHalfErrorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
+                               const Rgb<float>& guide, const BiasScaling& scaling) {
+  const bool follows = scaling.follows;
   // The planes take the relative values in the place of the samples, then their means, and last the errors.
   Plane<float> samples = squaredErrorSamples(halves, unbiased, variance);
   Plane<float> spread = varianceSamples(halves);
@@ -112,7 +113,7 @@ Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, c
       const auto noise = static_cast<double>(spread[i]), ofHalves = std::max(0.0, static_cast<double>(out[i]));
       const double v2 = follows ? 2 * static_cast<double>(levels[i]) : 0;
       const double share = follows ? v2 / std::max(v2 + 2 * noise + ofHalves, 1e-300) : 1;
-      out[i] = finiteFloat(static_cast<double>(unit[i]) * (noise + kept * share * ofHalves));
+      out[i] = finiteFloat(static_cast<double>(unit[i]) * (noise + scaling.kept * share * ofHalves));
     }
   });
   return out;

@@ -31,11 +31,15 @@ Plane<float> squaredErrorSamples(const Rgb<float> (&halves)[2], const Estimate& 
 // dark pixels around it an error that is beyond anything that they can have. Its sum over the image is meant, not its
 // pixels: where it is smallest it is too small, by selection. The halves must be independent of each other.
 //
-// The squared bias is that of images of half the samples. `follows`: it falls with v, as that of an image which shares
-// out between x and another one as their errors ask for it (combiners/README.md, Errors across halves). `kept`: it is
-// multiplied by that, for filters whose bias falls as they see more samples.
-Plane<float> errorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
-                      const Rgb<float>& guide, bool follows = false, double kept = 1);
+// The squared bias is that of images of half the samples, which `scaling` turns into that of all of them.
+struct BiasScaling {
+  // It falls with v, as that of an image which shares out between x and another one as their errors ask for it
+  // (combiners/README.md, Errors across halves).
+  bool follows = false;
+  double kept = 1;  // it is multiplied by that, for filters whose bias falls as they see more samples
+};
+Plane<float> crossHalfErrorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
+                               const Rgb<float>& guide, const BiasScaling& scaling = {});
 
 // u max(0, box15(squaredBias / u)), u as above: of unbiased samples of a squared bias, which may be negative.
 Plane<float> smoothedSquaredBias(const Plane<float>& squaredBias, const Rgb<float>& guide);

@@ -69,7 +69,7 @@ class Nfor : public Method {
     MethodResult result;
     result.image.mean = std::move(filtered.mean);
     for (int h = 0; h < 2; ++h) result.image.half[h] = std::move(filtered.half[h]);
-    result.error = errorMap(result.image.half, e, meanVariance(e), result.image.mean);
+    result.error = crossHalfErrorMap(result.image.half, e, meanVariance(e), result.image.mean);
     const Rgb<float>& share = filtered.selection;
     result.aovs.push_back({"weight.nfor.wide", channelMean(share.width(), share.height(), [&](size_t i, size_t c) {
                              return static_cast<double>(share[c][i]);

@@ -11,6 +11,7 @@
 
 #include "combiners/regression/colour_weights.h"
 #include "combiners/shrinkage/double_shrinkage.h"
+#include "combiners/shrinkage/shrinkage_errors.h"
 #include "combiners/statistics/half_statistics.h"
 #include "combiners/statistics/surface_smooth.h"
 #include "combiners/shrinkage/radiance_prior.h"

@@ -9,6 +9,7 @@
 #include <doctest/doctest.h>
 
 #include "combiners/shrinkage/double_shrinkage.h"
+#include "combiners/shrinkage/shrinkage_errors.h"
 #include "combiners/statistics/half_statistics.h"
 #include "combiners/pixels/plane_mean.h"
 #include "combiners/pipeline/registry.h"
