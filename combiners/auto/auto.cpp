@@ -18,7 +18,7 @@
 #include "combiners/pixels/finite_float.h"
 #include "combiners/shrinkage/fused_estimate.h"
 #include "combiners/statistics/direct_indirect.h"
-#include "combiners/pipeline/combine_plan.h"
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/registry.h"
 #include "combiners/ensemble/relative_weights.h"
 #include "combiners/auto/auto_filters.h"

@@ -12,6 +12,7 @@
 #include <cmath>
 
 #include "combiners/curves/curve_weight.h"
+#include "combiners/curves/sure_blend.h"
 #include "combiners/pipeline/denoise_cutoff.h"
 #include "combiners/statistics/variance.h"
 #include "combiners/pixels/finite_float.h"
@@ -19,15 +20,13 @@
 #include "combiners/pipeline/registry.h"
 #include "combiners/shrinkage/shrinkage.h"
 #include "combiners/statistics/sure_map.h"
-#include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 
 namespace braid {
 
 namespace {
 
-const OptionInfo kStep{"curves-step", 0.1, "Perturbation of the risk estimate in standard deviations of a pixel",
-                       0.001,         10,  false};
+const OptionInfo kStep = sureStepOption("curves");
 const OptionInfo kSlope{
     "curves-fallback-slope", -1, "Slope of pixels without a curve; -2: the paper, -1: theory", -2, -0.25, false};
 const OptionInfo kSlopePrior{
@@ -83,13 +82,6 @@ struct Variances {
   std::vector<double> earlierPasses;  // oldest first
   std::vector<Rgb<float>> earlier;
 };
-
-// SURE of the denoised image of n, filtered.
-SureMaps riskOf(const MethodInputs& in, const Estimate& n, const SureMapFilter& filter) {
-  const double step = std::clamp(in.options.number(kStep), 1e-3, 10.0);
-  SureMaps maps = sureMaps(n.mean, in.biased->mean, n.variance, in.seed, step, in.redenoise);
-  return {filter.risk(std::move(maps.risk), n.variance), filter(std::move(maps.covariance))};
-}
 
 Variances variancesOf(const MethodInputs& in, const Estimate& n, const SureMapFilter& filter, size_t points) {
   Variances v;
@@ -150,67 +142,82 @@ Plane<float> independentErrors(const Plane<float>& v, const Plane<float>& m, con
   return out;
 }
 
-void limitTo(Plane<float>& plane, const Plane<float>& most) {
-  for (size_t i = 0; i < plane.size(); ++i) plane[i] = std::min(plane[i], most[i]);
-}
-
 // The squared error of n + a (d - n), for the covariance q of both errors, no larger than it can be.
 double blendError(double v, double m, double q, double a) {
   const double bound = std::sqrt(v * m);
   return std::max(0.0, (1 - a) * (1 - a) * v + a * a * m + 2 * a * (1 - a) * std::clamp(q, -bound, bound));
 }
 
-// The halves take the weights of the whole image, where both inputs have halves.
+// What is known of the pixels before they are blended.
+struct Evidence {
+  SureMaps sure;  // of the denoised image, filtered
+  Variances now, atStop;
+  bool stopped = false;     // denoising has, and there is an atStop
+  double sharedPasses = 1;  // the share of those that were denoised in all
+};
+
+Evidence evidenceOf(const MethodInputs& in, const SureMapFilter& filter, size_t points) {
+  const Estimate &n = *in.unbiased, &source = in.stopped ? *in.stopped : n;
+  Evidence e;
+  SureMaps maps = denoisedSureMaps(in, source, kStep);
+  e.sure = {filter.risk(std::move(maps.risk), source.variance), filter(std::move(maps.covariance))};
+  e.now = variancesOf(in, n, filter, points);
+  e.stopped = in.stopped != nullptr;
+  if (e.stopped) e.atStop = variancesOf(in, source, filter, points);
+  e.sharedPasses = static_cast<double>(passesOf(source)) / std::max(1.0, e.now.passes);
+  return e;
+}
+
+// W of all pixels of a channel.
+Plane<float> channelWeights(const Evidence& e, size_t c, const MethodOptions& options, size_t points) {
+  const Plane<float>&m = e.sure.risk[c], &q = e.sure.covariance[c];
+  const Plane<float>& v = (e.stopped ? e.atStop : e.now).newest[c];
+  const auto weightsAt = [&](const Variances& at, double passesShared) {
+    if (options.number(kCovariance) == 0) return weightsOf(at, m, c, options, points);
+    return weightsOf(at, independentErrors(v, m, q, passesShared), c, options, points);
+  };
+  Plane<float> weight = weightsAt(e.now, e.sharedPasses);
+  if (!e.stopped) return weight;
+  const Plane<float> most = weightsAt(e.atStop, 1);
+  for (size_t i = 0; i < weight.size(); ++i) weight[i] = std::min(weight[i], most[i]);
+  return weight;
+}
+
+void blendChannel(const Evidence& e, const Plane<float>& weight, const Plane<float>& gate, size_t c, SureBlend& blend) {
+  parallelChunks(weight.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      const double w = static_cast<double>(weight[i]);
+      const bool firefly = isLoneFirefly(gate, blend.noisy.mean, blend.denoised.mean, i);
+      const double a = firefly ? 1.0 : w / (e.now.passes + w);
+      blend.set(c, i, [a](float noisy, float denoised) {
+        return finiteFloat((1 - a) * static_cast<double>(noisy) + a * static_cast<double>(denoised));
+      });
+      const double error = blendError(static_cast<double>(e.now.newest[c][i]), static_cast<double>(e.sure.risk[c][i]),
+                                      e.sharedPasses * static_cast<double>(e.sure.covariance[c][i]), a);
+      blend.result.error[i] += finiteFloat(error / 3);
+      blend.share[i] += static_cast<float>(a / 3);
+    }
+  });
+}
+
 MethodResult Curves::run(const MethodInputs& in) const {
-  const Estimate &n = *in.unbiased, &d = *in.biased, &source = in.stopped ? *in.stopped : n;
-  if (!in.redenoise) throw Error(ExitCode::Usage, "needs a denoiser that it can run again as its biased input");
+  const Estimate& source = in.stopped ? *in.stopped : *in.unbiased;
   const auto points = static_cast<size_t>(std::clamp(in.options.number(kPoints), 0.0, 8.0));
-  const bool pooled = in.options.number(kPool) != 0, covariance = in.options.number(kCovariance) != 0;
+  const bool pooled = in.options.number(kPool) != 0;
   const double sigma = pooled ? kBoxSigma : sureMapFilterSigma(source.variance);
-  const SureMapFilter filter(sigma, in.options.number(kRelative) != 0 ? &d.mean : nullptr, pooled);
-  const SureMaps sure = riskOf(in, source, filter);
-  const Variances now = variancesOf(in, n, filter, points);
-  Variances atStop;
-  if (in.stopped) atStop = variancesOf(in, source, filter, points);
-  const Variances& atSource = in.stopped ? atStop : now;
-  const double sharedPasses = static_cast<double>(passesOf(source)) / std::max(1.0, now.passes);
-  const int width = n.mean.width(), height = n.mean.height();
-  MethodResult result;
-  result.image.mean = Rgb<float>(width, height);
-  const bool halves = !n.half[0].empty() && !n.half[1].empty() && !d.half[0].empty() && !d.half[1].empty();
-  if (halves) result.image.half[0] = result.image.half[1] = Rgb<float>(width, height);
-  result.error = Plane<float>(width, height);
-  Plane<float> share(width, height);
-  const Plane<float> gate = in.options.number(kGate) != 0 ? fireflyGate(n.variance, kGateRadius) : Plane<float>();
-  for (size_t c = 0; c < 3; ++c) {
-    const Plane<float>&m = sure.risk[c], &q = sure.covariance[c];
-    const auto weightsAt = [&](const Variances& v, double passesShared) {
-      if (!covariance) return weightsOf(v, m, c, in.options, points);
-      return weightsOf(v, independentErrors(atSource.newest[c], m, q, passesShared), c, in.options, points);
-    };
-    Plane<float> weight = weightsAt(now, sharedPasses);
-    if (in.stopped) limitTo(weight, weightsAt(atStop, 1));
-    parallelChunks(weight.size(), kPixelChunk, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) {
-        const double w = static_cast<double>(weight[i]);
-        const double a = isLoneFirefly(gate, n.mean, d.mean, i) ? 1.0 : w / (now.passes + w);
-        const auto blend = [a](float x, float y) {
-          return finiteFloat((1 - a) * static_cast<double>(x) + a * static_cast<double>(y));
-        };
-        result.image.mean[c][i] = blend(n.mean[c][i], d.mean[c][i]);
-        for (int h = 0; halves && h < 2; ++h) result.image.half[h][c][i] = blend(n.half[h][c][i], d.half[h][c][i]);
-        result.error[i] += finiteFloat(blendError(static_cast<double>(now.newest[c][i]), static_cast<double>(m[i]),
-                                                  sharedPasses * static_cast<double>(q[i]), a) /
-                                       3);
-        share[i] += static_cast<float>(a / 3);
-      }
-    });
-  }
-  result.aovs.push_back({"weight.curves", std::move(share)});
-  using Kind = Attribute::Kind;
-  result.remarks = {{"sureMapFilterSigma", Kind::Float, "", 0, sigma, {}},
-                    {"curvePoints", Kind::Int, "", static_cast<int64_t>(now.earlier.size() + 1), 0, {}}};
-  if (in.stopped) result.remarks.push_back({"stoppedAfter", Kind::Int, "", static_cast<int64_t>(source.passes), 0, {}});
+  const SureMapFilter filter(sigma, in.options.number(kRelative) != 0 ? &in.biased->mean : nullptr, pooled);
+  const Evidence evidence = evidenceOf(in, filter, points);
+  const Plane<float> gate =
+      in.options.number(kGate) != 0 ? fireflyGate(in.unbiased->variance, kGateRadius) : Plane<float>();
+  SureBlend blend(in);
+  for (size_t c = 0; c < 3; ++c)
+    blendChannel(evidence, channelWeights(evidence, c, in.options, points), gate, c, blend);
+  MethodResult result = blend.finish(name(), sigma);
+  const auto count = [&](const char* key, size_t value) {
+    result.remarks.push_back({key, Attribute::Kind::Int, "", static_cast<int64_t>(value), 0, {}});
+  };
+  count("curvePoints", evidence.now.earlier.size() + 1);
+  if (in.stopped) count("stoppedAfter", source.passes);
   return result;
 }
 

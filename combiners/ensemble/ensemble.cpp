@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "combiners/statistics/half_statistics.h"
-#include "combiners/pipeline/combine_plan.h"
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/registry.h"
 #include "combiners/ensemble/relative_weights.h"
 #include "combiners/ensemble/weight_bilateral.h"

@@ -4,7 +4,7 @@
 // Denoising for Monte Carlo Renderings", 5.2.7, of one rendering in place of many).
 #include <algorithm>
 
-#include "combiners/pipeline/combine_plan.h"
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/registry.h"
 #include "combiners/ensemble/relative_weights.h"
 #include "combiners/ensemble/weight_bilateral.h"

@@ -8,7 +8,7 @@
 #include "combiners/pixels/window.h"
 #include "combiners/statistics/half_statistics.h"
 #include "combiners/pixels/finite_float.h"
-#include "combiners/pipeline/combine_plan.h"
+#include "combiners/pipeline/method_names.h"
 
 namespace braid {
 

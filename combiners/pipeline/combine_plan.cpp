@@ -3,17 +3,14 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
-#include <filesystem>
 #include <set>
 
 #include <fmt/format.h>
 
 #include "combiners/pipeline/denoise_cutoff.h"
 #include "combiners/pipeline/external_method.h"
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/registry.h"
-#include "renderer/core/error.h"
-#include "renderer/core/hash.h"
 
 namespace braid {
 
@@ -24,14 +21,6 @@ namespace {
 constexpr const char* kPreferredDenoisers[] = {"oidn", "nfor", "rdfc", "pw", "nlm"};
 // Severely biased on purpose; never chosen by itself.
 constexpr const char* kStressInput = "box";
-
-// "name@biased" cut at the first '@' that is no part of a parameter, which a number never has.
-std::pair<std::string, std::string> splitChain(const std::string& name) {
-  const size_t at = name.find('@'), colon = name.find(':');
-  if (at == std::string::npos) return {name, ""};
-  if (colon < at && name.find_first_not_of("0123456789", colon + 1) != at) return {name, ""};
-  return {name.substr(0, at), name.substr(at + 1)};
-}
 
 std::vector<std::string> splitAtPlus(const std::string& text) {
   std::vector<std::string> parts;
@@ -93,8 +82,8 @@ std::string CombinePlanner::add(const std::string& name) {
 void CombinePlanner::fill(Step& step, const std::string& chosen) {
   const Needs needs = step.method->needs();
   const bool takesBases = needs.bases > 0 || needs.anyBases;
-  if (const auto* outside = dynamic_cast<const ExternalMethod*>(step.method.get()))
-    step.skipReason = outside->skipReason();
+  if (const auto* external = dynamic_cast<const ExternalMethod*>(step.method.get()))
+    step.skipReason = external->skipReason();
   if (step.skipReason.empty()) step.skipReason = fillUnbiased(step);
   if (step.skipReason.empty() && needs.reference && !available_.reference)
     step.skipReason = "needs a reference: combine --reference FILE, or a sweep";
@@ -226,7 +215,7 @@ std::string CombinePlanner::fillBases(Step& step, const std::string& chosen) {
 
 bool CombinePlanner::readsDirectIndirect(const Step& step) const {
   const AvailableEstimate* e = available_.find(step.unbiased);
-  return step.method->needs().directIndirectHelps && e && e->directIndirect &&
+  return step.method->needs().helpful.directIndirect && e && e->directIndirect &&
          std::none_of(step.bases.begin(), step.bases.end(), [&](const std::string& name) {
            const AvailableEstimate* base = available_.find(name);
            return base && base->bias;
@@ -270,23 +259,6 @@ AvailableEstimates withoutMethods(const AvailableEstimates& available) {
   AvailableEstimates kept = available;
   std::erase_if(kept.estimates, [](const AvailableEstimate& e) { return isMethod(e.name); });
   return kept;
-}
-
-// The method for what follows the colon.
-std::unique_ptr<Method> withStop(const StoppingMethod& method, const std::string& full, size_t begin) {
-  uint64_t passes = 0;
-  const char *at = full.data() + begin, *end = full.data() + full.size();
-  const auto [next, error] = std::from_chars(at, end, passes);
-  if (at == end || error != std::errc() || next != end || passes == 0)
-    throw Error(ExitCode::Usage, fmt::format("{}: expected {}:PASSES, after which denoising stops, such as {}:128",
-                                             full, method.name(), method.name()));
-  return method.stoppedAfter(passes);
-}
-
-std::string knownMethods() {
-  std::string known;
-  for (const auto& m : makeMethods()) known += fmt::format("{}{}", known.empty() ? "" : ", ", m->name());
-  return known;
 }
 
 }  // namespace
@@ -356,55 +328,6 @@ KeptBuffers buffersOf(const CombinePlan& combinePlan) {
     all |= read;
   }
   return all;
-}
-
-bool isMethod(const std::string& name) {
-  const auto methods = makeMethods();
-  return std::any_of(methods.begin(), methods.end(), [&](const auto& m) { return name == m->name(); });
-}
-
-std::shared_ptr<const Method> findMethod(const std::string& full) {
-  const size_t colon = full.find(':');
-  const std::string name = full.substr(0, colon);
-  for (auto& m : makeMethods()) {
-    if (name != m->name()) continue;
-    if (colon == std::string::npos) return std::shared_ptr<const Method>(std::move(m));
-    const auto* outside = dynamic_cast<const ExternalMethod*>(m.get());
-    const auto* stopping = dynamic_cast<const StoppingMethod*>(m.get());
-    auto made = outside    ? outside->with(full.substr(colon + 1))
-                : stopping ? withStop(*stopping, full, colon + 1)
-                           : nullptr;
-    if (!made) throw Error(ExitCode::Usage, fmt::format("{}: {} takes no parameter after a colon", full, name));
-    return std::shared_ptr<const Method>(std::move(made));
-  }
-  throw Error(ExitCode::Usage, fmt::format("unknown method '{}': known are {}", name, knownMethods()));
-}
-
-std::vector<OptionInfo> allMethodOptions() {
-  std::vector<OptionInfo> all;
-  for (const auto& m : makeMethods())
-    for (const OptionInfo& option : m->options())
-      if (std::none_of(all.begin(), all.end(), [&](const OptionInfo& o) { return o.name == option.name; }))
-        all.push_back(option);
-  return all;
-}
-
-std::string layerName(const std::string& name) {
-  const size_t colon = name.find(':');
-  std::string text = name.substr(0, colon);
-  if (colon != std::string::npos) {
-    std::string file = name.substr(colon + 1, name.find(':', colon + 1) - colon - 1), more;
-    if (text.ends_with("external-command")) {  // the program, and what tells commands of one program apart
-      ContentHash hash;
-      hash.add(name);
-      file = file.substr(file.find_first_not_of("' "));
-      file = file.substr(0, file.find_first_of("' "));
-      more = "-" + hexString(hash.value()).substr(0, 4);
-    }
-    text.append("-").append(std::filesystem::path(file).stem().string()).append(more);
-  }
-  std::replace(text.begin(), text.end(), '.', '-');
-  return text;
 }
 
 }  // namespace braid

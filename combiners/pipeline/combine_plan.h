@@ -2,10 +2,7 @@
 // Decides, from what there is, which denoisers and combiners run on what and in which order: a pure function that a
 // plan prints before a render and that the pipeline executes after it. What cannot run says why in one sentence.
 //
-// A method is named by its name in the registry. Three forms add to it:
-//   name:parameter   a method that takes a parameter, such as external:FILE; the rest of the text is the parameter
-//   name@biased      the method with this biased input, which may itself have one: js@ensemble, js@easy@nfor
-//   name:passes      a method that stops denoising, such as curves:128 (combiners/pipeline/denoise_cutoff.h)
+// Forms of names: combiners/pipeline/method_names.h.
 //
 // How roles are filled where no user names an estimate: combiners/README.md, How estimates become an image. Names of
 // methods go before names of estimates: an image that a file holds from an earlier run of a method is not used.
@@ -78,18 +75,5 @@ CombinePlan makeCombinePlan(const AvailableEstimates& available, const std::vect
 
 // What a render must keep for the steps that can run.
 KeptBuffers buffersOf(const CombinePlan& combinePlan);
-
-// Whether a method of exactly this name is registered.
-bool isMethod(const std::string& name);
-
-// The method that a name stands for, without its '@' part. Throws Error(Usage) naming those that exist.
-std::shared_ptr<const Method> findMethod(const std::string& name);
-
-// The options of every registered method, each once.
-std::vector<OptionInfo> allMethodOptions();
-
-// A name for layers of files: what follows a colon is shortened to the stem of a file name, a command to its
-// program and four digits of its hash, and no dots.
-std::string layerName(const std::string& name);
 
 }  // namespace braid

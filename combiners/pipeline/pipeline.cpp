@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/pipeline.h"
 
 #include <algorithm>

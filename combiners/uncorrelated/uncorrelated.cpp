@@ -12,6 +12,7 @@
 
 #include "combiners/pixels/finite_float.h"
 #include "combiners/pipeline/registry.h"
+#include "combiners/statistics/variance.h"
 #include "combiners/uncorrelated/uncorrelated_groups.h"
 #include "combiners/uncorrelated/uncorrelated_noise.h"
 #include "combiners/uncorrelated/uncorrelated_share.h"
@@ -20,8 +21,7 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kGamma{
-    "uncorrelated-gamma", -1, "Sensitivity of the weights to noise; negative: chosen by variance", -1, 1e9, false};
+const OptionInfo kGamma = gammaOption("uncorrelated");
 
 const OptionInfo kMostNoise{"uncorrelated-most-noise",
                             224,
@@ -45,13 +45,7 @@ class Uncorrelated : public Method {
     return "Independent and correlated image with input-dependent weights, nearly unbiased";
   }
   MethodKind kind() const override { return MethodKind::Combiner; }
-  Needs needs() const override {
-    Needs needs;
-    needs.correlated = needs.quarters = true;
-    needs.passes = 4;
-    needs.variance = false;
-    return needs;
-  }
+  Needs needs() const override { return uncorrelatedNeeds(); }
   // 264 of it only where there are fireflies.
   MethodMemory memory(const MemoryCase& /*of*/) const override { return {340, 40}; }
   std::vector<OptionInfo> options() const override { return {kGamma, kMostNoise, kMeasured, kShareOut}; }
@@ -89,10 +83,9 @@ MethodResult Uncorrelated::run(const MethodInputs& in) const {
   if (noise.most > 0 && !levels.empty()) noise.levels = &levels;
   const UncorrelatedInputs groups[2] = {uncorrelatedGroup(y, z, 0, swap, swap, noise),
                                         uncorrelatedGroup(y, z, 1, 1 - swap, 1 - swap, noise)};
-  const double gamma = chosenGamma(in, kGamma, groups);
   MethodResult result;
+  const double gamma = filterGroups(in, kGamma, groups, result);
   Estimate& out = result.image;
-  for (int h = 0; h < 2; ++h) out.half[h] = uncorrelatedFiltered(groups[h], gamma);
   std::array<Plane<float>, 3> share;
   const bool measured = in.options.number(kMeasured) != 0;
   // Where they share samples, z brings nothing new to a plain mean.
@@ -115,7 +108,6 @@ MethodResult Uncorrelated::run(const MethodInputs& in) const {
     addShared(out.mean, ofY ? &ofY->mean : nullptr, ofZ ? &ofZ->mean : nullptr, mean, share);
     result.error = halvesVariance(out.half);
   }
-  result.remarks.push_back(gammaRemark(gamma));
   return result;
 }
 

@@ -9,12 +9,7 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kGamma{"uncorrelated-cross-gamma",
-                        -1,
-                        "Sensitivity of the weights to noise; negative: chosen by variance",
-                        -1,
-                        1e9,
-                        false};
+const OptionInfo kGamma = gammaOption("uncorrelated-cross");
 
 class UncorrelatedCross : public Method {
  public:
@@ -23,26 +18,18 @@ class UncorrelatedCross : public Method {
     return "Independent and correlated image, each half weighted by the other: an unbiased baseline";
   }
   MethodKind kind() const override { return MethodKind::Combiner; }
-  Needs needs() const override {
-    Needs needs;
-    needs.correlated = needs.quarters = true;
-    needs.passes = 4;
-    needs.variance = false;
-    return needs;
-  }
+  Needs needs() const override { return uncorrelatedNeeds(); }
   MethodMemory memory(const MemoryCase& /*of*/) const override { return {50, 40}; }
   std::vector<OptionInfo> options() const override { return {kGamma}; }
 
   MethodResult run(const MethodInputs& in) const override {
     const Estimate &y = *in.unbiased, &z = *in.correlated;
     const UncorrelatedInputs groups[2] = {uncorrelatedGroup(y, z, 0, 0, 1), uncorrelatedGroup(y, z, 1, 1, 0)};
-    const double gamma = chosenGamma(in, kGamma, groups);
     MethodResult result;
+    filterGroups(in, kGamma, groups, result);
     Estimate& out = result.image;
-    for (int h = 0; h < 2; ++h) out.half[h] = uncorrelatedFiltered(groups[h], gamma);
     out.mean = average(out.half[0], out.half[1]);
     result.error = halvesVariance(out.half);
-    result.remarks.push_back(gammaRemark(gamma));
     return result;
   }
 };

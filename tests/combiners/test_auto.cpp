@@ -11,6 +11,7 @@
 #include "combiners/statistics/fireflies.h"
 #include "combiners/statistics/half_statistics.h"
 #include "combiners/shrinkage/fused_estimate.h"
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/pipeline.h"
 #include "tests/support/combiner_fixture.h"
 

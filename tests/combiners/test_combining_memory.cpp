@@ -2,6 +2,7 @@
 // Methods take the memory that they say they take, and so does the pipeline.
 #include <doctest/doctest.h>
 
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/external_method.h"
 #include "combiners/pipeline/pipeline.h"
 #include "combiners/pipeline/pipeline_memory.h"

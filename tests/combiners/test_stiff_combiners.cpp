@@ -14,6 +14,7 @@
 #include "combiners/shrinkage/debias.h"
 #include "combiners/statistics/half_statistics.h"
 #include "combiners/shrinkage/fused_estimate.h"
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/pipeline.h"
 #include "combiners/pipeline/combine_plan.h"
 #include "tests/support/stiff_inputs.h"

@@ -5,6 +5,7 @@
 
 #include <doctest/doctest.h>
 
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/pipeline.h"
 #include "renderer/core/error.h"
 #include "renderer/film/files/exr.h"

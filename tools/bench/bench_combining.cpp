@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/pipeline.h"
 #include "integrators/registry.h"
 #include "renderer/core/parallel.h"

@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/registry.h"
 #include "renderer/core/error.h"
 #include "renderer/film/files/exr.h"

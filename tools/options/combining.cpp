@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/denoise_cutoff.h"
 #include "combiners/pipeline/registry.h"
 #include "renderer/core/error.h"

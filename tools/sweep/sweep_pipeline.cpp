@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/pipeline.h"
 #include "renderer/core/error.h"
 #include "tools/publish/estimated_error.h"

@@ -4,6 +4,7 @@
 
 #include <doctest/doctest.h>
 
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/pipeline.h"
 #include "combiners/pipeline/registry.h"
 #include "combiners/ensemble/relative_weights.h"

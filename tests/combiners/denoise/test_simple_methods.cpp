@@ -6,6 +6,7 @@
 #include <doctest/doctest.h>
 
 #include "combiners/denoise/oidn.h"
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/external_method.h"
 #include "combiners/pipeline/pipeline.h"
 #include "combiners/pipeline/registry.h"
