@@ -62,8 +62,9 @@ class Rdfc : public Method {
     MethodResult result;
     result.image.mean = std::move(filtered.mean);
     for (size_t h = 0; h < 2; ++h) result.image.half[h] = std::move(filtered.half[h]);
-    result.error = result.image.half[0].empty() ? std::move(filtered.risk)
-                                                : crossHalfErrorMap(result.image.half, e, meanVariance(e), result.image.mean);
+    result.error = result.image.half[0].empty()
+                       ? std::move(filtered.risk)
+                       : crossHalfErrorMap(result.image.half, e, meanVariance(e), result.image.mean);
     for (size_t k = 0; k < filtered.selection.size(); ++k)
       result.aovs.push_back({std::string("weight.rdfc.") + kCandidateNames[k], std::move(filtered.selection[k])});
     for (const OptionInfo* option : {&kDemodulate, &kVariance, &kFireflies}) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <span>
 
+#include "combiners/denoise/rdfc/rdfc_pairs.h"
+
 namespace braid {
 
 namespace {
@@ -84,10 +86,11 @@ class CandidateTile {
   void addOffset(int dx, int dy) {
     for (int y = tile_.y0 - kLargestPatch; y < tile_.y1 + kLargestPatch; ++y) addDistanceRow(dx, dy, y);
     for (int y = tile_.y0; y < tile_.y1; ++y) {
+      const TripleRow row{dx, dy, tile_.x0, y, count_};
       coarse_.clear(count_);
-      if (!features_.empty()) addFeatureRow(dx, dy, y);
-      addColourCandidate<1>(sums_[0], narrow_, dx, dy, y);
-      addColourCandidate<3>(sums_[1], wide_, dx, dy, y);
+      if (!features_.empty()) addFeatureRow(row);
+      addColourCandidate<1>(sums_[0], narrow_, row);
+      addColourCandidate<3>(sums_[1], wide_, row);
     }
   }
 
@@ -109,8 +112,9 @@ class CandidateTile {
   void addDistanceRow(int dx, int dy, int y) {
     const RdfcRows pixels = coarse_.distance();
     const RdfcRows change = rowsAt(change_, y), narrow = rowsAt(narrow_, y), wide = rowsAt(wide_, y);
-    colourRows<true>(colour_.guide, kColourK, Spread::Both, dx, dy, tile_.x0 - kLargestPatch, y,
-                     rdfcRowCount(tile_.width() + 2 * kLargestPatch), pixels, change);
+    colourRows<true>(colour_.guide, kColourK, Spread::Both,
+                     {dx, dy, tile_.x0 - kLargestPatch, y, rdfcRowCount(tile_.width() + 2 * kLargestPatch)}, pixels,
+                     change);
     boxRow<1>(pixels.forward + 2, count_, narrow.forward);
     boxRow<1>(pixels.backward + 2, count_, narrow.backward);
     boxRow<1>(pixels.both + 2, count_, narrow.both);
@@ -120,57 +124,57 @@ class CandidateTile {
   }
 
   // The weights of the features, and the candidate that has nothing else.
-  void addFeatureRow(int dx, int dy, int y) {
+  void addFeatureRow(const TripleRow& row) {
     fine_.clear(count_);
     for (const RdfcGuide& feature : features_) {
-      featureRows<true>(feature, Spread::Both, dx, dy, tile_.x0, y, count_, fine_.distance(), coarse_.distance());
+      featureRows<true>(feature, Spread::Both, row, fine_.distance(), coarse_.distance());
       const float scale = 1.0f / static_cast<float>(feature.size());
       fine_.add(scale, count_);
       coarse_.add(scale, count_);
     }
     fine_.finish(count_);
     coarse_.finish(count_);
-    addTargets(sums_[2].plain, images_, dx, dy, y, fine_.forward(), fine_.backward());
+    addTargets(sums_[2].plain, images_, row, fine_.forward(), fine_.backward());
   }
 
   template <int kPatch>
-  void addColourCandidate(CandidateSums& sums, Blocks& blocks, int dx, int dy, int y) {
+  void addColourCandidate(CandidateSums& sums, Blocks& blocks, const TripleRow& row) {
     constexpr float kScale = 1.0f / (3 * (2 * kPatch + 1) * (2 * kPatch + 1));
-    const RdfcRows first = rowsAt(blocks, y - kPatch), distance = coarse_.distance(), change = rowsAt(change_, y);
+    const RdfcRows first = rowsAt(blocks, row.y - kPatch), distance = coarse_.distance();
+    const RdfcRows change = rowsAt(change_, row.y);
     boxColumn<kPatch>(first.forward, pitch_, count_, distance.forward);
     boxColumn<kPatch>(first.backward, pitch_, count_, distance.backward);
     boxColumn<kPatch>(first.both, pitch_, count_, distance.both);
-    addWithColour(sums.plain, images_, distance, kScale, dx, dy, y);
+    addWithColour(sums.plain, images_, distance, kScale, row);
     addChange(change.forward + kLargestPatch, distance.forward);
     addChange(change.backward + kLargestPatch, distance.backward);
     addChange(change.both + kLargestPatch, distance.both);
-    addWithColour(sums.moved, {&mean_, 1}, distance, kScale, dx, dy, y);
+    addWithColour(sums.moved, {&mean_, 1}, distance, kScale, row);
   }
 
   // Images weighted by the smaller one of the features' weights and those of the distances.
-  void addWithColour(Sums& sums, std::span<const ImagePointer> images, const RdfcRows& distance, float scale, int dx,
-                     int dy, int y) {
+  void addWithColour(Sums& sums, std::span<const ImagePointer> images, const RdfcRows& distance, float scale,
+                     const TripleRow& row) {
     float *forward = weights_[0].data(), *backward = weights_[1].data();
     std::copy_n(coarse_.forward(), count_, forward);
     std::copy_n(coarse_.backward(), count_, backward);
     minWithWeights(distance, scale, count_, forward, backward);
-    addTargets(sums, images, dx, dy, y, forward, backward);
+    addTargets(sums, images, row, forward, backward);
   }
 
   void addChange(const float* __restrict change, float* __restrict distance) {
     for (int x = 0; x < count_; ++x) distance[x] += change[x];
   }
 
-  void addTargets(Sums& sums, std::span<const ImagePointer> images, int dx, int dy, int y, const float* forward,
+  void addTargets(Sums& sums, std::span<const ImagePointer> images, const TripleRow& row, const float* forward,
                   const float* backward) {
-    sums.addWeightsAt(y, forward, backward, count_);
-    for (size_t i = 0; i < images.size(); ++i) {
-      const ImagePointer& image = images[i];
-      const int qx = tile_.x0 + dx, qy = y + dy, rx = tile_.x0 - dx, ry = y - dy;
-      addWeighted3(forward, backward, image[0]->at(qx, qy), image[1]->at(qx, qy), image[2]->at(qx, qy),
-                   image[0]->at(rx, ry), image[1]->at(rx, ry), image[2]->at(rx, ry), count_, sums.values.row(3 * i, y),
-                   sums.values.row(3 * i + 1, y), sums.values.row(3 * i + 2, y));
-    }
+    sums.addWeightsAt(row.y, forward, backward, count_);
+    for (size_t i = 0; i < images.size(); ++i)
+      for (size_t c = 0; c < 3; ++c) {
+        const MirroredPlane& plane = *images[i][c];
+        addWeighted(forward, backward, plane.at(row.x + row.dx, row.y + row.dy),
+                    plane.at(row.x - row.dx, row.y - row.dy), count_, sums.values.row(3 * i + c, row.y));
+      }
   }
 
   void storePixel(CandidateSums& sums, bool perturbed, int x, int y, RdfcCandidate& out) {

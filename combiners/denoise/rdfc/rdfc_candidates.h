@@ -10,7 +10,7 @@
 #include <atomic>
 #include <vector>
 
-#include "combiners/denoise/rdfc/rdfc_pairs.h"
+#include "combiners/denoise/rdfc/rdfc_planes.h"
 
 namespace braid {
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "combiners/denoise/rdfc/rdfc_pairs.h"
+#include "combiners/denoise/rdfc/rdfc_planes.h"
 #include "renderer/film/estimates.h"
 
 namespace braid {

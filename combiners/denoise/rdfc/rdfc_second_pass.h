@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "combiners/denoise/rdfc/rdfc_pairs.h"
+#include "combiners/denoise/rdfc/rdfc_planes.h"
 #include "renderer/core/plane.h"
 
 namespace braid {

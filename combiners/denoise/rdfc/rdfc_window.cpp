@@ -81,7 +81,7 @@ class WindowTile {
   void addDistanceRow(int dx, int dy, int y) {
     const int margin = kPatch + kSmoothing;
     const RdfcRows pixels = rowsAt(differences_, tile_.y0), sums = rowsAt(sums_, y);
-    colourRows<false>(*filter_.guide, filter_.k, filter_.spread, dx, dy, tile_.x0 - margin, y, width(margin), pixels,
+    colourRows<false>(*filter_.guide, filter_.k, filter_.spread, {dx, dy, tile_.x0 - margin, y, width(margin)}, pixels,
                       {});
     boxRow<kPatch>(pixels.forward, width(kSmoothing), sums.forward);
     boxRow<kPatch>(pixels.backward, width(kSmoothing), sums.backward);
@@ -119,7 +119,7 @@ class WindowTile {
   void minWithFeatures(int dx, int dy, int y, const RdfcRows& smooth) {
     featureWeight_.clear(width());
     for (const RdfcGuide& feature : *filter_.features) {
-      featureRows<false>(feature, filter_.spread, dx, dy, tile_.x0, y, width(), featureWeight_.distance(), {});
+      featureRows<false>(feature, filter_.spread, {dx, dy, tile_.x0, y, width()}, featureWeight_.distance(), {});
       featureWeight_.add(1.0f / static_cast<float>(feature.size()), width());
     }
     featureWeight_.finish(width());
