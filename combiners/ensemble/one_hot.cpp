@@ -82,8 +82,14 @@ void addGuide(const Guide& guide, size_t p, size_t q, int count, float* __restri
   }
 }
 
-void filterBlock(const std::vector<Plane<float>>& in, const std::vector<Guide>& guides, int x0, int y, int count,
-                 float* sums, std::vector<Plane<float>>& out) {
+// Pixels of one row, at most kBlock.
+struct Block {
+  int x0, y, count;
+};
+
+void filterBlock(const std::vector<Plane<float>>& in, const std::vector<Guide>& guides, const Block& block, float* sums,
+                 std::vector<Plane<float>>& out) {
+  const auto [x0, y, count] = block;
   const Plane<float>& shape = in[0];
   float norm[kBlock] = {}, kernel[kBlock];
   std::fill_n(sums, in.size() * kBlock, 0.0f);
@@ -139,7 +145,7 @@ std::vector<Plane<float>> featureFiltered(const std::vector<Plane<float>>& in, c
   parallelRows(in[0].height, [&](int y) {
     std::vector<float> sums(in.size() * kBlock);
     for (int x0 = 0; x0 < in[0].width; x0 += kBlock)
-      runVectorised([&] { filterBlock(in, guides, x0, y, std::min(kBlock, in[0].width - x0), sums.data(), out); });
+      runVectorised([&] { filterBlock(in, guides, {x0, y, std::min(kBlock, in[0].width - x0)}, sums.data(), out); });
   });
   return out;
 }

@@ -117,7 +117,7 @@ std::string CombinePlanner::fillUnbiased(Step& step) {
   step.unbiased = options_.unbiased.empty() ? defaultUnbiased(available_) : options_.unbiased;
   if (step.unbiased.empty()) return "needs an unbiased estimate with independent pixels";
   if (!available_.find(step.unbiased))
-    return fmt::format("needs the unbiased estimate {}, which there is not", step.unbiased);
+    return fmt::format("needs the unbiased estimate {}, which does not exist", step.unbiased);
   return lacks(step.unbiased, step.method->needs(), true);
 }
 
@@ -131,7 +131,7 @@ std::string CombinePlanner::fillCorrelated(Step& step) {
       }
   if (step.correlated.empty()) return "needs an estimate with correlated pixels, such as crn";
   const AvailableEstimate* e = available_.find(step.correlated);
-  if (!e) return fmt::format("needs the correlated estimate {}, which there is not", step.correlated);
+  if (!e) return fmt::format("needs the correlated estimate {}, which does not exist", step.correlated);
   const Needs needs = step.method->needs();
   if (needs.halves && !e->halves) return fmt::format("needs the halves of {}", e->name);
   if (needs.quarters && !e->quarters) return fmt::format("needs the quarter buffers of {}", e->name);

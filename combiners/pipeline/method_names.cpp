@@ -79,7 +79,7 @@ std::string layerName(const std::string& name) {
   std::string text = name.substr(0, colon);
   if (colon != std::string::npos) {
     std::string file = name.substr(colon + 1, name.find(':', colon + 1) - colon - 1), more;
-    if (text.ends_with("external-command")) {  // the program, and what tells commands of one program apart
+    if (text.ends_with("external-command")) {  // the program, and what distinguishes commands of one program
       ContentHash hash;
       hash.add(name);
       file = file.substr(file.find_first_not_of("' "));

@@ -159,7 +159,7 @@ std::string Runner::missingInput(const Step& step, bool& failed) const {
     if (made && made->failed) failed = true;
     if (made && !made->ran()) return fmt::format("needs {}, which did not run: {}", name, made->step.skipReason);
     const Estimate* e = estimate(name);
-    if (!e) return fmt::format("needs {}, which there is not", name);
+    if (!e) return fmt::format("needs {}, which does not exist", name);
     if (step.method->needs().halves && (e->half[0].empty() || e->half[1].empty()))
       return fmt::format("needs the halves of {}", name);
   }

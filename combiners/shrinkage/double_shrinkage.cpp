@@ -38,14 +38,13 @@ const OptionInfo kOwnHalves{"double-shrinkage-own-halves", 1,
 const OptionInfo kGate{"double-shrinkage-gate", 1,
                        "1: replace lone fireflies of the unbiased image first; 0: the paper"};
 
-const OptionInfo kFireflies{
-    "double-shrinkage-remove-fireflies", 1,
-    "1: take out fireflies of a photon map that one or two quarters alone speak for; 0: the paper"};
+const OptionInfo kFireflies{"double-shrinkage-remove-fireflies", 1,
+                            "1: remove fireflies of a photon map that only one or two quarters show; 0: the paper"};
 const OptionInfo kDebias{"double-shrinkage-debias", 1,
                          "1: correct a photon map by its own bias estimate; 0: the paper"};
 const OptionInfo kMeasured{
     "double-shrinkage-measured", 1,
-    "1: a photon map's bias, and light that the unbiased image lacks, are what they show to be; 0: the paper"};
+    "1: measure a photon map's bias, and light that the unbiased image lacks, across halves; 0: the paper"};
 const OptionInfo kFused{"double-shrinkage-fused", 1,
                         "1: fit the prior to the photon map where that is far better, and measure it so; 0: the paper"};
 const OptionInfo kChosen{"double-shrinkage-chosen", 1,

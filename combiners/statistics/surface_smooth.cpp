@@ -28,23 +28,23 @@ std::vector<Plane<float>> boxMeans(const std::vector<const Plane<float>*>& plane
 }
 
 // Adds the neighbours at (dx, other - y) to the sums of one row: kFeatures guide planes come first in `in`, and the sum
-// of the weights last in `sums`, whose rows are `pitch` apart.
-void addNeighbours(const PackedRows& in, int width, int y, int other, int dx, float* sums, size_t pitch) {
+// of the weights last in `sums`, whose rows are as far apart as those of `in`.
+void addNeighbours(const PackedRows& in, int width, int y, int other, int dx, float* sums) {
   const int begin = std::max(0, -dx), end = std::min(width, width - dx);
   const float *centre = in.row(0, y), *neighbour = in.row(0, other) + dx;
-  const size_t step = in.pitch();
+  const size_t pitch = in.pitch();
   const auto values = static_cast<size_t>(in.planes() - kFeatures);
   for (int x = begin; x < end; x += kLanes) {
     FloatLanes distance[2] = {};
     for (size_t k = 0; k < kFeatures; ++k) {
-      const FloatLanes d = loadLanes(centre + k * step + x) - loadLanes(neighbour + k * step + x);
+      const FloatLanes d = loadLanes(centre + k * pitch + x) - loadLanes(neighbour + k * pitch + x);
       distance[k / 3] += d * d;
     }
     FloatLanes w = expNegative(distance[0] * kAlbedoScale + distance[1] * kNormalScale);
     if (end - x < kLanes) w = laneIndices() < static_cast<float>(end - x) ? w : FloatLanes{};
     for (size_t k = 0; k < values; ++k) {
       float* sum = sums + k * pitch + x;
-      storeLanes(sum, loadLanes(sum) + w * loadLanes(neighbour + (kFeatures + k) * step + x));
+      storeLanes(sum, loadLanes(sum) + w * loadLanes(neighbour + (kFeatures + k) * pitch + x));
     }
     storeLanes(sums + values * pitch + x, loadLanes(sums + values * pitch + x) + w);
   }
@@ -66,7 +66,7 @@ std::vector<Plane<float>> surfaceSmooth(const std::vector<const Plane<float>*>& 
     const size_t pitch = in.pitch();
     std::vector<float> sums((planes.size() + 1) * pitch, 0.0f);
     for (int other = std::max(0, y - radius); other <= std::min(height - 1, y + radius); ++other)
-      for (int dx = -radius; dx <= radius; ++dx) addNeighbours(in, width, y, other, dx, sums.data(), pitch);
+      for (int dx = -radius; dx <= radius; ++dx) addNeighbours(in, width, y, other, dx, sums.data());
     const float* weights = sums.data() + planes.size() * pitch;
     for (size_t k = 0; k < planes.size(); ++k)
       for (int x = 0; x < width; ++x)

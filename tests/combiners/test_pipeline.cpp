@@ -235,7 +235,7 @@ TEST_CASE("Estimates fill their roles, and names override the rules") {
   CHECK(step("inverse-variance", named).unbiased == "bdpt");
   CHECK(step("inverse-variance", named).biased == "box");
   named.unbiased = "vcm";
-  CHECK(contains(step("inverse-variance", named).skipReason, "vcm, which there is not"));
+  CHECK(contains(step("inverse-variance", named).skipReason, "vcm, which does not exist"));
   CHECK(step("average", boxes()).bases == std::vector<std::string>{"box", "sppm"});
   // An estimate that is consistent only takes the place where nothing is unbiased, and is no input beside itself.
   const AvailableEstimates before = available;

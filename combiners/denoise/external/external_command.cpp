@@ -170,7 +170,7 @@ Rgb<float> ExternalCommand::denoised(const Rgb<float>& image, const MethodInputs
     }
   };
   if (wantsFeatures() && !in.features)
-    throw Error(ExitCode::BadInput, "the command reads albedo or normal, which there is not");
+    throw Error(ExitCode::BadInput, "the command reads albedo or normal, which the inputs lack");
   put("color", &image);
   if (in.features) {
     put("albedo", &in.features->albedo.mean);

@@ -18,7 +18,7 @@ const OptionInfo kOffsets{"nfor-offsets", 1, "1: pixel offsets are features too;
 const OptionInfo kVariance{"nfor-variance", 0,
                            "Variance behind the weights: 0 of the samples, 1 shrunk to a box mean, 2 filtered", 0, 2};
 const OptionInfo kFireflies{"nfor-remove-fireflies", 1,
-                            "1: take out fireflies that one half or two quarters alone speak for; 0: the paper"};
+                            "1: remove fireflies that only one half or two quarters show; 0: the paper"};
 const OptionInfo kStride{"nfor-stride", 2, "Distance of the regression models in pixels; 1: the paper", 1, 9};
 
 NforOptions optionsOf(const MethodInputs& in) {

@@ -17,7 +17,7 @@ const OptionInfo kVariance{"rdfc-variance", 0,
                            0, 2};
 
 const OptionInfo kFireflies{"rdfc-remove-fireflies", 1,
-                            "1: take out fireflies that one half or two quarters alone speak for; 0: the paper"};
+                            "1: remove fireflies that only one half or two quarters show; 0: the paper"};
 
 const char* const kCandidateNames[] = {"first", "second", "third"};
 
