@@ -78,10 +78,10 @@ FarmJob farmJob(const PlanOptions& o, const Settings& planned) {
         job.render);
   if (o.transparent) job.render.push_back({"--transparent", std::nullopt});
   if (!o.saveEvery.empty()) job.render.push_back({"--save-every", o.saveEvery});
-  if (planned.quarters) job.render.push_back({"--quarters", std::nullopt});
-  if (planned.directIndirect) job.render.push_back({"--direct-indirect", std::nullopt});
-  if (planned.history) job.render.push_back({"--history", std::nullopt});
-  job.render.push_back({"--aovs", planned.features ? "features" : "none"});
+  if (planned.keep.quarters) job.render.push_back({"--quarters", std::nullopt});
+  if (planned.keep.directIndirect) job.render.push_back({"--direct-indirect", std::nullopt});
+  if (planned.keep.history) job.render.push_back({"--history", std::nullopt});
+  job.render.push_back({"--aovs", planned.keep.features ? "features" : "none"});
   carry(o.imageOptions, {"output", "combine", "aovs"}, job.merge);
   job.merge.push_back({"--combine", o.image.combine.combine});
   job.merge.push_back({"--aovs", nameOf(o.image.aovSet())});
