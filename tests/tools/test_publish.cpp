@@ -256,13 +256,13 @@ TEST_CASE("A limit of time holds for the whole process, and what it leaves no ti
   // A second of combining is expected of this size on one thread, by a cost that is known beforehand.
   const std::string common = "render '" + kCornellFile + "' --threads 1 -o o.exr --log-json log --integrator pt ";
   const auto end = [&] { return records(folder.path / "log").back(); };
-  Run run = braidRun(folder, common + "--size 640x360 --time 0.6 --combine nfor");
+  Run run = braidRun(folder, common + "--size 640x360 --time 1 --combine nfor");
   CHECK(run.code == 0);
   CHECK(contains(run.err, "the image is not combined"));
   CHECK(readImage(folder.path / "o.exr").planes.count("combined.nfor.R") == 0);
   CHECK(end()["spp"].get<int>() >= 1);
-  // One sample in every pixel is the least.
-  run = braidRun(folder, common + "--size 640x360 --time 0.02 --combine none");
+  // A state holds whole passes.
+  run = braidRun(folder, common + "--size 640x360 --time 0.02 --combine none --checkpoint o.state");
   CHECK(run.code == 0);
   CHECK(end()["spp"] == 1);
   CHECK(contains(run.err, "--time 0.0s: the first pass over the image is not done by then and goes on"));

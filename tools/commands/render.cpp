@@ -26,6 +26,7 @@
 #include "tools/run/run_clock.h"
 #include "tools/publish/scene_identity.h"
 #include "tools/publish/tev_client.h"
+#include "tools/publish/coarse_output.h"
 #include "version.h"
 
 namespace braid {
@@ -255,6 +256,34 @@ int exitCode(const RunReport& result, const RenderOptions& o, const WrittenImage
   return static_cast<int>(ExitCode::TargetNotReached);
 }
 
+// What the user is told at the end of a run, whichever picture came of it.
+struct Ending {
+  const RenderOptions& o;
+  const Scene& scene;
+  const LoadTimes& load;
+  JsonLog& json;
+
+  // `began`, `ended`: of the pass loop. Returns the exit code.
+  int tell(const RunReport& result, double began, double ended, const WrittenImage& written) const {
+    const RunTimes parts = timesOf(load, scene.buildTimes(), began, ended, written);
+    if (!o.scene.quiet) tellResult(result, o, parts, written);
+    json.write("end", resultRecord(result, o, parts, scene, written));
+    json.finish();
+    return exitCode(result, o, written);
+  }
+
+  int coarse(const CoarseRender& render, const Plan& plan, const ImageOutput& output, double began) const {
+    const double ended = processSeconds();
+    const TimeLimit limit(plan.settings.seconds);
+    const WrittenImage written =
+        writeCoarse(render, plan, output, planAttributes(scene, plan, scene.accel().isa()), limit);
+    json.write("warning", {{"text", written.warnings.front()}});
+    RunReport result = render.report();
+    if (result.reason != StopReason::Cancelled) result.reason = StopReason::Time;
+    return tell(result, began, ended, written);
+  }
+};
+
 int runRender(RenderOptions o) {
   Settings settings = renderSettings(o);
   checkOutputs(o);
@@ -277,6 +306,22 @@ int runRender(RenderOptions o) {
                                {samples, !o.checkpoint.empty() || !o.passes.empty(), earlier.has_value()});
   if (!o.image.files().empty()) requireRunnable(plan.combinePlan, o.image.combine.wanted());
   requireWithinLimit(plan.memory);
+  const TimeLimit limit(settings.seconds);
+  const double writing = limit.exists() ? expectedCosts(plan.plan.window, o.image, settings.threads).plain : 0;
+  // States hold whole passes, so a run that keeps one finishes its first.
+  const double measured = processSeconds();
+  std::optional<CoarseRender> coarse;
+  if (!o.image.files().empty() && o.checkpoint.empty() && o.passes.empty() && !earlier &&
+      mayBeTooLate(plan.plan.window, settings.threads, limit))
+    coarse.emplace(
+        *scene, camera, plan.plan, [&] { return limit.left() - writing; }, &interrupted);
+  const Ending ending{o, *scene, times, json};
+  if (coarse && !coarse->fullRoundFits()) {
+    coarse->refine(limit.grace());
+    const int code = ending.coarse(*coarse, plan.plan, viewer.with(o.image), measured);
+    keepUntilExit(std::move(scene));
+    return code;
+  }
   auto ownedSession = std::make_unique<Session>(*scene, plan.plan);
   Session& session = *ownedSession;
   session.identify(BRAID_VERSION, BRAID_BUILD_FLAGS, sceneIdentity(o.scene, scene->data()),
@@ -297,16 +342,17 @@ int runRender(RenderOptions o) {
   const bool writesImages = !o.image.files().empty();
   if (writesImages) images.check();
   ProgressLine line(o.scene.quiet);
-  const TimeLimit limit(settings.seconds);
   Publisher publisher({viewer.with(o.image), o.checkpoint, saveEvery, o.error, settings.spp == 0 && !limit.exists(),
                        settings.threads, limit},
                       session);
   if (limit.exists()) session.setTimeLeft([&] { return publisher.timeLeft(); });
-  LateFirstPass late(limit, session, o.scene.quiet);
+  LateFirstPass late(limit, session, o.scene.quiet, coarse.has_value(), writing);
   const double began = processSeconds();
   const RunReport result = session.advance(
       [&](const Progress& p) {
-        late.over(json);
+        late.over(p.round, json);
+        if (late.dropped()) return false;
+        coarse.reset();
         if (writesImages) images.check();
         std::vector<Publication> news = publisher.round(p);
         viewer.addFailure(news);
@@ -315,18 +361,14 @@ int runRender(RenderOptions o) {
         json.write("progress", {{"spp", p.round}, {"seconds", p.seconds}, {"secondsLeft", p.secondsLeft}});
         return true;
       },
-      &interrupted, nullptr, &publisher.reached());
+      &interrupted, &late.dropped(), &publisher.reached());
   const double ended = processSeconds();
   line.finish();
-
-  const WrittenImage written = publisher.finish();
-  const RunTimes parts = timesOf(times, scene->buildTimes(), began, ended, written);
-  if (!o.scene.quiet) tellResult(result, o, parts, written);
-  json.write("end", resultRecord(result, o, parts, *scene, written));
-  json.finish();
+  const int code = late.dropped() ? ending.coarse(*coarse, session.plan(), viewer.with(o.image), began)
+                                  : ending.tell(result, began, ended, publisher.finish());
   keepUntilExit(std::move(ownedSession));
   keepUntilExit(std::move(scene));
-  return exitCode(result, o, written);
+  return code;
 }
 
 }  // namespace

@@ -194,6 +194,13 @@ void noteMissingEstimates(const ImageFile& file, const ReadOptions& options) {
 }
 
 Estimates readEstimates(const ImageFile& file, const ReadOptions& options) {
+  for (const Attribute& a : file.attributes)
+    if (a.name == kRenderedSizeAttribute)
+      throw Error(
+          ExitCode::BadInput,
+          fmt::format("{}: its pixels are copies of those of an image of {}, which have no noise of their own to "
+                      "filter: render it again with more --time",
+                      file.path, a.text));
   const std::vector<std::string> layers = estimateNames(file);
   if (!layers.empty()) {
     if (const auto alpha = file.planes.find("A"); options.alpha && alpha != file.planes.end())

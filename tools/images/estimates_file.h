@@ -14,6 +14,10 @@ namespace braid {
 // "…/passes" and "braid/seed". `timing`: also "…/seconds".
 std::vector<Attribute> estimateAttributes(const Estimates& estimates, bool timing = true);
 
+// The resolution that was rendered, such as "960x540", where the pixels of a file are copies of fewer
+// (coarse_render.h).
+inline constexpr const char* kRenderedSizeAttribute = "braid/renderedSize";
+
 // What a file of another renderer is read as, for files that hold an image before and after denoising.
 enum class ImageRole { Noisy, Denoised };
 
@@ -38,7 +42,8 @@ struct ReadOptions {
 //             moments m2_<integrator> of the moment integrator
 //   Cycles    <Layer>.Noisy Image or <Layer>.Combined; Denoising Albedo, Denoising Normal, Depth
 // The last part of layer names is matched without regard to case. Features without halves and variances count as free
-// of noise. Throws Error(BadInput) for files without colours.
+// of noise. Throws Error(BadInput) for files without colours, and
+// for those whose pixels are copies of each other.
 Estimates readEstimates(const ImageFile& file, const ReadOptions& options = {});
 
 // Estimates by an option such as --unbiased: FILE; or HALFA,HALFB, whose mean is the image; or IMAGE,HALFA,HALFB. FILE

@@ -27,14 +27,8 @@ namespace {
 // "auto" on top of it.
 constexpr double kWritingAll = 1.6e-6, kWritingFew = 4e-7, kCombining = 3e-6;
 
-int threadsOf(const PublishOptions& options) { return options.threads > 0 ? options.threads : machineThreads(); }
-
-PublicationSchedule::Costs expectedCosts(const Session& session, const PublishOptions& options) {
-  const Rgb<double>& pixels = session.state().estimates.front().sums.sums().front();
-  const double share = static_cast<double>(pixels.size()) / threadsOf(options);
-  const double writing = options.image.aovSet() == AovSet::All ? kWritingAll : kWritingFew;
-  return {share * writing, share * (writing + kCombining)};
-}
+int threadsOf(int threads) { return threads > 0 ? threads : machineThreads(); }
+int threadsOf(const PublishOptions& options) { return threadsOf(options.threads); }
 
 // What compressing rows took stays with the allocator otherwise, beside what combining the next image takes.
 void giveBackFreedMemory() {
@@ -46,6 +40,12 @@ void giveBackFreedMemory() {
 uint64_t samplesOf(const FilmState& state) { return state.estimates.front().sums.passes(); }
 
 }  // namespace
+
+PublicationSchedule::Costs expectedCosts(const PixelWindow& window, const ImageOutput& image, int threads) {
+  const double share = static_cast<double>(window.width()) * window.height() / threadsOf(threads);
+  const double writing = image.aovSet() == AovSet::All ? kWritingAll : kWritingFew;
+  return {share * writing, share * (writing + kCombining)};
+}
 
 void BackgroundJob::start(std::function<void()> task) {
   BRAID_ASSERT(idle());
@@ -78,7 +78,8 @@ Publisher::Publisher(PublishOptions options, Session& session)
     : options_(std::move(options)),
       combines_(!options_.image.combine.wanted().empty() || !options_.image.combine.denoisers.empty()),
       session_(session),
-      schedule_(options_.saveEvery, options_.targetError, combines_, expectedCosts(session, options_)),
+      schedule_(options_.saveEvery, options_.targetError, combines_,
+                expectedCosts(session.plan().window, options_.image, options_.threads)),
       helpers_(std::max(1, threadsOf(options_) / 4)),
       combinesLast_(combines_) {}
 

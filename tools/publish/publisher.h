@@ -62,6 +62,9 @@ struct Publication {
   std::string failure;  // one line, told once for each cause; the render goes on
 };
 
+// What images of these pixels are expected to cost before there was one; `threads` 0: all that the process may use.
+PublicationSchedule::Costs expectedCosts(const PixelWindow& window, const ImageOutput& image, int threads);
+
 class Publisher {
  public:
   Publisher(PublishOptions options, Session& session);
