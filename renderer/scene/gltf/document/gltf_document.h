@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 // Images are OpenImageIO's, files our own.
 #define TINYGLTF_NO_STB_IMAGE
 #define TINYGLTF_NO_STB_IMAGE_WRITE
@@ -78,6 +80,9 @@ struct Document {
 // gltf_document.cpp: reads and checks a file. Throws SceneError where nothing can follow: no glTF 2, unsafe, or a
 // required extension that is unknown.
 void readDocument(Document& document, const std::string& path);
+
+// tinygltf.cpp: what tinygltf makes of one node.
+void parseNode(const nlohmann::json& json, tinygltf::Node& node);
 
 // gltf_views.cpp: places every view inside its buffer and decompresses meshopt views.
 void resolveViews(Document& document);

@@ -8,3 +8,12 @@
 #define TINYGLTF_IMPLEMENTATION
 #include <tiny_gltf.h>
 #undef TINYGLTF_IMPLEMENTATION  // other files may follow in a unity build
+
+namespace braid::gltf {
+
+void parseNode(const nlohmann::json& json, tinygltf::Node& node) {
+  // It refuses nothing: members of a wrong type would count as absent.
+  tinygltf::ParseNode(&node, nullptr, json, false);
+}
+
+}  // namespace braid::gltf
