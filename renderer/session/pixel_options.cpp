@@ -6,6 +6,7 @@
 #include "renderer/core/hash.h"
 #include "renderer/session/integrator.h"
 #include "renderer/session/pixel_filter.h"
+#include "renderer/session/rendering_revision.h"
 
 namespace braid {
 
@@ -34,6 +35,7 @@ std::vector<StateOption> pixelOptions(const Plan& plan) {
     integrators += fmt::format("{}{}{}", integrators.empty() ? "" : ",", p.integrator->name(),
                                p.passesPerRound > 1 ? fmt::format("*{}", p.passesPerRound) : "");
   std::vector<StateOption> list{
+      {"the rendering revision", std::to_string(kRenderingRevision)},
       {"--size", fmt::format("{}x{}", s.width, s.height)},
       {"--crop", fmt::format("{},{},{},{}", w.x0, w.y0, w.x1, w.y1)},
       {"the camera", cameraHash(plan.camera)},

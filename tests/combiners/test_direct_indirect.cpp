@@ -188,7 +188,7 @@ TEST_CASE("Direct light is kept for auto without photon maps, on request, and no
     settings.integrators = names;
     Plan plan = makePlan(scene, scene.data().cameras.at(0), settings, integrators());
     CombineChoice choice;
-    choice.combine = combine;
+    choice.methods = parseMethods(combine);
     planCombining(choice, 16, plan);
     return plan;
   };

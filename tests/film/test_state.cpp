@@ -4,10 +4,12 @@
 #include <cstring>
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
 #include "renderer/film/files/state_file.h"
+#include "renderer/session/rendering_revision.h"
 #include "tests/support/command_line.h"
 #include "tests/support/render_fixture.h"
 
@@ -356,6 +358,11 @@ TEST_CASE("States of other renders are refused with a sentence that names what d
   s.maxDepth = 5;
   s.seed = 3;
   CHECK(contains(refused(s), "old.state: cannot be resumed: --seed was 0 and is 3; --max-depth was 32 and is 5"));
+  StateIdentity older = state.identity;
+  for (StateOption& o : older.options)
+    if (o.name == "the rendering revision") o.value = "0";
+  CHECK(difference(older, state.identity, false) ==
+        fmt::format("the rendering revision was 0 and is {}", kRenderingRevision));
   const auto changed = [&](const auto& change) {
     Settings other = everythingKept("pt", 2);
     change(other);

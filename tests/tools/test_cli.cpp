@@ -89,10 +89,26 @@ TEST_CASE("A render writes the documented channels and header") {
     CHECK_MESSAGE(names.count(name), name);
   CHECK(names.count("A") == 0);
   CHECK(names.count("pt.q0.R") == 0);
-  for (const char* name : {"Software", "braid/version", "braid/build", "braid/sceneHash", "braid/plan",
-                           "braid/planHash", "braid/seed", "braid/sampler", "braid/filter", "braid/maxDepth",
-                           "braid/varianceIs", "braid/rejectedSamples", "braid/pt/passes", "braid/pt/seconds",
-                           "samplesPerPixel", "renderTimeSeconds", "worldToCamera", "worldToNDC", "chromaticities"})
+  for (const char* name : {"Software",
+                           "braid/version",
+                           "braid/renderingRevision",
+                           "braid/build",
+                           "braid/sceneHash",
+                           "braid/plan",
+                           "braid/planHash",
+                           "braid/seed",
+                           "braid/sampler",
+                           "braid/filter",
+                           "braid/maxDepth",
+                           "braid/varianceIs",
+                           "braid/rejectedSamples",
+                           "braid/pt/passes",
+                           "braid/pt/seconds",
+                           "samplesPerPixel",
+                           "renderTimeSeconds",
+                           "worldToCamera",
+                           "worldToNDC",
+                           "chromaticities"})
     CHECK_MESSAGE(attribute(file, name), name);
   REQUIRE(attribute(file, "samplesPerPixel"));
   CHECK(attribute(file, "samplesPerPixel")->integer == 2);

@@ -329,7 +329,7 @@ TEST_CASE("Lists, plans and help show methods with their reasons and options") {
   CHECK(contains(braidRun(folder, scene + "--combine average --bases box").out, "- average: needs 2 bases"));
   CHECK(contains(braidRun(folder, test::plainly(scene)).out, "- history: "));
   for (const char* command : {"combine", "render"})
-    CHECK(contains(braidRun(folder, std::string(command) + " --help").out, "--box-radius"));
+    CHECK(contains(braidRun(folder, std::string(command) + " --help-methods").out, "--box-radius"));
 }
 
 TEST_CASE("auto fuses what an auto plan rendered, offline as in process") {

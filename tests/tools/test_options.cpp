@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Numbers out of their range are refused with the range, by every option of every subcommand.
 #include <set>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <doctest/doctest.h>
 
+#include "combiners/pipeline/combine_plan.h"
+#include "combiners/pipeline/registry.h"
 #include "tests/support/command_line.h"
 #include "tools/options/cli.h"
+#include "tools/options/help.h"
 #include "tools/options/old_spellings.h"
 #include "tools/options/option_checks.h"
 
@@ -182,6 +186,69 @@ TEST_CASE("Options by their old names mean what the present ones do, up to a lon
   test::Folder folder;
   const Run run = braidRun(folder, "plan '" BRAID_SOURCE_DIR "/scenes/cornell.glb' --light-parts --auto-second-pass 0");
   CHECK(run.code == 0);
+}
+
+namespace {
+
+std::string helpOf(const std::vector<std::string>& arguments) {
+  CLI::App app;
+  app.set_help_flag("-h,--help", "Help");
+  MainOptions options;
+  Action action;
+  addCommands(app, options, action);
+  const std::optional<HelpRequest> request = findHelp(app, arguments);
+  return request ? helpText(app, *request) : "";
+}
+
+// Codepoints of the longest line.
+size_t longestLine(const std::string& text) {
+  size_t longest = 0, length = 0;
+  for (const char c : text) {
+    if ((static_cast<unsigned char>(c) & 0xc0) != 0x80) ++length;
+    if (c == '\n') longest = std::max(longest, std::exchange(length, 0) - 1);
+  }
+  return longest;
+}
+
+}  // namespace
+
+TEST_CASE("The help of a command is one screen; that of everything names every option") {
+  CLI::App app;
+  MainOptions mainOptions;
+  Action action;
+  addCommands(app, mainOptions, action);
+  for (CLI::App* command : app.get_subcommands(nullptr)) {
+    const std::string name = command->get_name();
+    CAPTURE(name);
+    const std::string help = helpOf({name, "-h"});
+    CHECK(std::count(help.begin(), help.end(), '\n') <= 50);
+    CHECK(longestLine(help) <= 100);
+    CHECK(contains(help, "Usage: braid " + name));
+    CHECK(contains(help, command->get_footer()));
+    CHECK(help == helpOf({name, "x.glb", "--help"}));
+    const std::string all = helpOf({name, "--help-all"});
+    for (const CLI::Option* option : command->get_options()) CHECK(contains(all, option->get_name(false, true)));
+  }
+  CHECK(contains(helpOf({"-h"}), "  render "));
+  CHECK(helpOf({"-h", "render"}) == helpOf({"render", "-h"}));
+  CHECK(helpOf({"render", "x.glb"}).empty());
+  CHECK(helpOf({"render", "--", "-h"}).empty());
+}
+
+TEST_CASE("The help of a method has its options and no others") {
+  const std::string box = helpOf({"render", "-h", "box"}), all = helpOf({"combine", "--help-methods"});
+  CHECK(contains(box, "--box-radius"));
+  CHECK_FALSE(contains(box, "--nlm-window"));
+  CHECK(helpOf({"render", "x.glb", "--help", "js@box"}) == helpOf({"render", "-h", "js"}));
+  for (const OptionInfo& info : allMethodOptions()) CHECK(contains(all, "--" + info.name));
+  for (const auto& m : makeMethods()) CHECK(contains(all, std::string(m->name()) + ": "));
+  // What is no method's name may be the scene that was to be rendered.
+  CHECK(helpOf({"render", "-h", "x.glb"}) == helpOf({"render", "-h"}));
+  test::Folder folder;
+  const Run run = braidRun(folder, "render -h boxx");
+  CHECK(run.code == 1);
+  CHECK(contains(run.err, "-h boxx: no denoiser or combiner of this name: known are "));
+  CHECK(braidRun(folder, "render none.glb --spp 0 -h").code == 0);
 }
 
 }  // namespace braid::test_options

@@ -6,10 +6,13 @@
 #include <sstream>
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
 #include "renderer/film/files/exr.h"
+#include "renderer/session/rendering_revision.h"
+#include "tests/support/contains.h"
 #include "tests/support/gltf_fixture.h"
 #include "tests/support/render_fixture.h"
 #include "tools/images/estimates_file.h"
@@ -32,11 +35,11 @@ SweepOptions smallSweep(const Folder& folder) {
   o.scenes = {test::sourcePath("scenes/cornell.glb")};
   o.output = (folder.path / "sweep").string();
   o.methods = {"pt"};
-  o.spp = "4:16";
+  o.spp = parseLadder("4:16", false);
   o.seeds = 2;
   o.referenceSpp = 64;
-  o.size = "24x24";
-  o.sampler = "independent";
+  o.size = {24, 24};
+  o.sampler = SamplerKind::Independent;
   o.maxDepth = 5;
   o.noPlots = true;
   o.quiet = true;
@@ -187,11 +190,11 @@ TEST_CASE("A table that is read and written again keeps its bytes") {
 TEST_CASE("A sweep may grow, but rows of other options are refused") {
   const Folder folder;
   SweepOptions o = smallSweep(folder);
-  o.spp = "2";
+  o.spp = parseLadder("2", false);
   o.seeds = 1;
   REQUIRE(sweep(o) == 0);
   SweepOptions more = o;
-  more.spp = "2:4";
+  more.spp = parseLadder("2:4", false);
   more.seeds = 2;
   REQUIRE(sweep(more) == 0);
   CHECK(readSweepTable(o.output + "/sweep.csv").rows.size() == 4);
@@ -211,7 +214,7 @@ TEST_CASE("A sweep may grow, but rows of other options are refused") {
   CHECK(failureOf([&] { sweep(other); }).first == ExitCode::Usage);
   // A better reference changes every error.
   other = more;
-  other.spp = "8";
+  other.spp = parseLadder("8", false);
   other.referenceSpp = 128;
   CHECK(failureOf([&] { sweep(other); }).second.find("another reference of the scene cornell") != std::string::npos);
   std::filesystem::remove(o.output + "/sweep.json");
@@ -223,7 +226,7 @@ TEST_CASE("The ladder of seconds records the true seconds and samples past each 
   const Folder folder;
   SweepOptions o = smallSweep(folder);
   o.spp.clear();
-  o.time = "0.02:0.08";
+  o.time = parseLadder("0.02:0.08", true);
   o.seeds = 1;
   REQUIRE(sweep(o) == 0);
   const SweepTable t = readSweepTable(o.output + "/sweep.csv");
@@ -245,7 +248,7 @@ TEST_CASE("The ladder of seconds records the true seconds and samples past each 
 TEST_CASE("References that show something else are refused with a sentence") {
   const Folder folder;
   SweepOptions o = smallSweep(folder);
-  o.spp = "2";
+  o.spp = parseLadder("2", false);
   o.seeds = 1;
   REQUIRE(sweep(o) == 0);
   const std::string reference = std::filesystem::directory_iterator(o.output + "/references")->path().string();
@@ -262,10 +265,11 @@ TEST_CASE("References that show something else are refused with a sentence") {
     CHECK(code == ExitCode::BadInput);
     return reason;
   };
-  CHECK(refusal([](SweepOptions& s) { s.size = "24x16"; }) ==
-        reference +
-            ": is no reference for this sweep: it has 24x24 pixels, the sweep renders 24x16; give --size 24x24 "
-            "or another reference");
+  CHECK(refusal([](SweepOptions& s) {
+          s.size = {24, 16};
+        }) == reference +
+                  ": is no reference for this sweep: it has 24x24 pixels, the sweep renders 24x16; give --size 24x24 "
+                  "or another reference");
   CHECK(refusal([](SweepOptions& s) { s.maxDepth = 6; }).find("--max-depth 5") != std::string::npos);
   CHECK(refusal([](SweepOptions& s) { s.scenes = {test::sourcePath("scenes/plates.glb")}; }).find("camera") !=
         std::string::npos);
@@ -281,12 +285,33 @@ TEST_CASE("References that show something else are refused with a sentence") {
   settings.integrators = {"pt"};
   const ReferenceFrame frame = referenceFrame(scene, camera, settings);
   const auto rendered =
-      renderReference(folder.path.string(), scene, camera, settings, test::integrators(), {}, nullptr);
+      renderReference(folder.path.string(), {scene, camera, settings, test::integrators()}, {}, nullptr);
   REQUIRE(rendered);
   CHECK(readReference(rendered->file, frame, "pt", 0, 1).contentHash == rendered->contentHash);
   CHECK(failureOf([&] { readReference(rendered->file, frame, "pt", kReferenceSeed, 1); }).second.find("seed") !=
         std::string::npos);
   CHECK(rendered->passedOver.empty());
+  // Other pixels than this braid makes: a given one is refused, a kept one rendered anew.
+  ImageFile older = readImage(rendered->file);
+  Estimates stale = readEstimates(older);
+  stale.attributes = older.attributes;
+  for (Attribute& a : stale.attributes)
+    if (a.name == "braid/renderingRevision") a.integer = kRenderingRevision + 1;
+  const std::string keptPath = rendered->file, otherPath = folder.path / "other_revision.exr";
+  ExrOptions halves;
+  halves.floatHeadline = true;
+  writeExr(otherPath, stale, older.rgb(""), nullptr, halves);
+  const std::string revisions =
+      fmt::format("rendering revision {}, and this braid renders at {}", kRenderingRevision + 1, kRenderingRevision);
+  CHECK(test::contains(failureOf([&] { readReference(otherPath, frame, "pt", 0, 1); }).second, revisions));
+  std::filesystem::rename(otherPath, keptPath);
+  std::string reason;
+  CHECK_FALSE(keptReference(folder.path.string(), frame, "pt", 2, &reason));
+  CHECK(test::contains(reason, revisions));
+  REQUIRE(renderReference(folder.path.string(), {scene, camera, settings, test::integrators()}, {}, nullptr));
+  reason.clear();
+  CHECK(keptReference(folder.path.string(), frame, "pt", 2, &reason));
+  CHECK(reason.empty());
   // A file that shows a combined image first: its unbiased estimate is the reference, for that has independent halves.
   const ImageFile file = readImage(rendered->file);
   Estimates combined = readEstimates(file);
@@ -322,7 +347,7 @@ TEST_CASE("Squared error of path tracing falls as one over the samples") {
   o.scenes = {test::sourcePath("scenes/furnace.glb")};
   o.maxDepth = 8;
   o.metrics = {"relL2"};
-  o.spp = "4:64";
+  o.spp = parseLadder("4:64", false);
   o.seeds = 4;
   o.referenceSpp = 128;
   REQUIRE(sweep(o) == 0);
@@ -445,7 +470,7 @@ TEST_CASE("Denoisers and combiners are measured on the render that pt is measure
   SweepOptions o = smallSweep(folder);
   o.methods = {"pt", "box"};
   o.seeds = 1;
-  o.spp = "4,8";
+  o.spp = parseLadder("4,8", false);
   REQUIRE(sweep(o) == 0);
   const SweepTable t = readSweepTable(o.output + "/sweep.csv");
   REQUIRE(t.rows.size() == 4);

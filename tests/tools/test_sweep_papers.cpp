@@ -178,10 +178,10 @@ TEST_CASE("Squared bias comes from products of different runs, without the noise
 
 TEST_CASE("The preset fills in what was not given, and every method of it can run") {
   SweepOptions o;
-  o.spp = "4";
+  o.spp = parseLadder("4", false);
   applyPreset("papers", {"--spp"}, o);
-  CHECK(o.spp == "4");
-  CHECK(o.size == "192x108");
+  CHECK(o.spp == std::vector<double>{4});
+  CHECK(o.size == FrameSize{192, 108});
   CHECK(o.methods == paperMethods());
   const auto integrators = makeIntegrators();
   CHECK(sweepMethods(o.methods, pointersTo(integrators)).size() == o.methods.size());
@@ -190,8 +190,8 @@ TEST_CASE("The preset fills in what was not given, and every method of it can ru
   const Folder folder;
   o.scenes = {test::sourcePath("scenes/cornell.glb")};
   o.output = (folder.path / "sweep").string();
-  o.spp = "8,32,64";
-  o.size = "16x12";
+  o.spp = parseLadder("8,32,64", false);
+  o.size = {16, 12};
   o.referenceSpp = 64;
   o.noPlots = o.quiet = true;
   std::ostringstream out;

@@ -214,7 +214,7 @@ TEST_CASE("Images arrive in tev bit by bit, and only tiles that have changed are
   TevImage image = pictureOf(300, 270, 0.5f);
   image[0].plane[7] = std::numeric_limits<float>::quiet_NaN();
   image[1].plane[8] = std::numeric_limits<float>::infinity();
-  TevClient client(viewer.address());
+  TevClient client(parseTevAddress(viewer.address()));
   client.show("a scene: noisy", image);
   CHECK(waitUntil([&] { return viewer.take(), shows(viewer.viewed(), "a scene: noisy", image); }));
   Viewed v = viewer.viewed();
@@ -240,7 +240,7 @@ TEST_CASE("What was shown last still arrives when the client ends") {
   Viewer viewer;
   const TevImage image = pictureOf(64, 64, 2);
   const auto show = [&] {
-    TevClient client(viewer.address());
+    TevClient client(parseTevAddress(viewer.address()));
     client.show("last", image);
   };
   CHECK(seconds(show) < TevClient::kGrace);
@@ -250,7 +250,7 @@ TEST_CASE("What was shown last still arrives when the client ends") {
 
 TEST_CASE("An absent viewer costs no time and is told of once") {
   const double took = seconds([] {
-    TevClient client("127.0.0.1:" + std::to_string(freePort()));
+    TevClient client({"127.0.0.1", std::to_string(freePort())});
     std::string warning;
     for (int i = 0; i < 50; ++i) client.show("image", pictureOf(64, 64, static_cast<float>(i)));
     CHECK(waitUntil([&] { return !(warning = client.takeWarning()).empty(); }));
@@ -265,7 +265,7 @@ TEST_CASE("An absent viewer costs no time and is told of once") {
 
 TEST_CASE("A viewer that comes later, or comes back, gets the newest images") {
   const int port = freePort();
-  TevClient client("localhost:" + std::to_string(port));
+  TevClient client({"localhost", std::to_string(port)});
   const TevImage old = pictureOf(40, 30, 1), image = pictureOf(40, 30, 2);
   client.show("image", old);
   CHECK(waitUntil([&] { return !client.takeWarning().empty(); }));
@@ -280,7 +280,7 @@ TEST_CASE("A viewer that comes later, or comes back, gets the newest images") {
 
 TEST_CASE("A viewer that hangs holds nobody up") {
   Viewer viewer;  // takes no byte
-  auto client = std::make_unique<TevClient>(viewer.address());
+  auto client = std::make_unique<TevClient>(parseTevAddress(viewer.address()));
   double longest = 0;
   for (int i = 0; i < 8; ++i) {
     TevImage image = pictureOf(1000, 700, static_cast<float>(i));
@@ -293,11 +293,11 @@ TEST_CASE("A viewer that hangs holds nobody up") {
 TEST_CASE("An address that is none is refused") {
   for (const char* address : {"", ":1", "host:", "host:0", "host:70000", "host:12x", "host:-3"}) {
     INFO(address);
-    CHECK_THROWS_AS(TevClient{address}, const Error&);
+    CHECK_THROWS_AS(parseTevAddress(address), const Error&);
   }
   for (const char* address : {"127.0.0.1", "127.0.0.1:9", "[::1]:9", "[::1]"}) {
     INFO(address);
-    CHECK_NOTHROW(TevClient{address});
+    CHECK_NOTHROW(parseTevAddress(address));
   }
   const Folder folder;
   const Run run = braidRun(folder, "render '" + kCornellFile + "' -o o.exr --tev here:there");

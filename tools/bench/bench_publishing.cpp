@@ -58,55 +58,71 @@ class TemporaryFile {
   std::filesystem::path path_;
 };
 
+// What became of the publications on the way of all repeats.
+struct Counts {
+  int published = 0, combined = 0;
+};
+
+// A render whose file is written plain, at its end.
+Cost costAlone(const Scene& scene, const Plan& plan, const ImageOutput& image) {
+  WrittenImage written;
+  Cost cost = costOf([&] {
+    Session session(scene, plan);
+    session.advance();
+    const std::optional<Plane<float>> alpha = session.alpha();
+    Estimates estimates = describedEstimates(session, true);
+    written = writeImage(image.plain(), estimates, alpha ? &*alpha : nullptr, plan.settings.threads);
+  });
+  cost.writing = written.writeSeconds;
+  return cost;
+}
+
+// The same with publications on the way and combiners.
+Cost costPublished(const Scene& scene, const Plan& plan, const PublishOptions& options, Counts& counts) {
+  WrittenImage written;
+  double spent = 0;
+  Cost cost = costOf([&] {
+    Session session(scene, plan);
+    Publisher publisher(options, session);
+    session.advance([&](const Progress& p) {
+      for (const Publication& news : publisher.round(p)) {
+        counts.published += news.image.cancelled || !news.failure.empty() ? 0 : 1;
+        counts.combined += news.combined && !news.image.cancelled ? 1 : 0;
+      }
+      return true;
+    });
+    written = publisher.finish();
+    spent = publisher.spent();
+  });
+  cost.publishing = spent;
+  cost.combining = written.combineSeconds;
+  cost.writing = written.writeSeconds;
+  return cost;
+}
+
 }  // namespace
 
 nlohmann::json benchPublishing(const Scene& scene, const CameraData& camera, const Settings& settings,
-                               const std::string& methods, int repeats) {
+                               const std::vector<std::string>& methods, int repeats) {
   const auto integrators = makeIntegrators();
   Plan plan = makePlan(scene, camera, settings, pointersTo(integrators));
   const TemporaryFile file;
   PublishOptions options;
   options.image.file = file.path();
-  options.image.aovs = "all";
-  options.image.combine.combine = methods;
+  options.image.aovs = AovSet::All;
+  options.image.combine.methods = methods;
   options.threads = settings.threads;
-  requireRunnable(planCombining(options.image.combine, settings.spp, plan), options.image.combine.wanted());
+  requireRunnable(planCombining(options.image.combine, settings.spp, plan), methods);
   std::vector<Cost> alone, published;
-  int publications = 0, combined = 0;
-  WrittenImage last;
+  Counts counts;
   for (int k = 0; k < repeats; ++k) {
-    alone.push_back(costOf([&] {
-      Session session(scene, plan);
-      session.advance();
-      ImageOutput plain = options.image;
-      plain.combine.combine = "none";
-      const std::optional<Plane<float>> alpha = session.alpha();
-      Estimates estimates = describedEstimates(session, true);
-      last = writeImage(plain, estimates, alpha ? &*alpha : nullptr, settings.threads);
-    }));
-    alone.back().writing = last.writeSeconds;
-    double spent = 0;
-    published.push_back(costOf([&] {
-      Session session(scene, plan);
-      Publisher publisher(options, session);
-      session.advance([&](const Progress& p) {
-        for (const Publication& news : publisher.round(p)) {
-          publications += news.image.cancelled || !news.failure.empty() ? 0 : 1;
-          combined += news.combined && !news.image.cancelled ? 1 : 0;
-        }
-        return true;
-      });
-      last = publisher.finish();
-      spent = publisher.spent();
-    }));
-    published.back().publishing = spent;
-    published.back().combining = last.combineSeconds;
-    published.back().writing = last.writeSeconds;
+    alone.push_back(costAlone(scene, plan, options.image));
+    published.push_back(costPublished(scene, plan, options, counts));
   }
   const Cost a = median(alone), p = median(published);
   const double more = p.publishing + p.combining + std::max(0.0, p.writing - a.writing);
   return {{"spp", settings.spp},
-          {"methods", methods},
+          {"methods", options.image.combine.text()},
           {"seconds", a.seconds},
           {"publishedSeconds", p.seconds},
           {"overhead", p.seconds / a.seconds - 1},
@@ -118,8 +134,8 @@ nlohmann::json benchPublishing(const Scene& scene, const CameraData& camera, con
           {"processorSeconds", a.processor},
           {"publishedProcessorSeconds", p.processor},
           {"processorOverhead", p.processor / a.processor - 1},
-          {"publications", static_cast<double>(publications) / repeats + 1},
-          {"combinedPublications", static_cast<double>(combined) / repeats + 1}};
+          {"publications", static_cast<double>(counts.published) / repeats + 1},
+          {"combinedPublications", static_cast<double>(counts.combined) / repeats + 1}};
 }
 
 }  // namespace braid

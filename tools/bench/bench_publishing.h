@@ -18,6 +18,6 @@ namespace braid {
 // seconds, is what was published on the way, the last combining and what its file takes longer to write than the
 // plain one. Throws Error(Usage) for unknown names.
 nlohmann::json benchPublishing(const Scene& scene, const CameraData& camera, const Settings& settings,
-                               const std::string& methods, int repeats);
+                               const std::vector<std::string>& methods, int repeats);
 
 }  // namespace braid

@@ -15,8 +15,10 @@
 #include "tools/options/combining.h"
 #include "tools/images/estimates_file.h"
 #include "tools/options/file_uses.h"
+#include "tools/options/help.h"
 #include "tools/publish/image_output.h"
 #include "tools/options/option_checks.h"
+#include "tools/options/option_texts.h"
 #include "tools/options/output_options.h"
 #include "tools/images/same_view.h"
 #include "version.h"
@@ -26,7 +28,8 @@ namespace braid {
 namespace {
 
 struct CombineOptions {
-  std::string unbiased, correlated, reference, output, png, aovs = "all";
+  std::string unbiased, correlated, reference, output, png;
+  AovSet aovs = AovSet::All;
   CombineChoice choice;
   uint64_t samplesPerPixel = 0;
   double exposure = 0;
@@ -139,7 +142,7 @@ Inputs readInputs(const CombineOptions& o, PipelineOptions& pipeline) {
   for (std::string& base : pipeline.roles.bases)
     if (!all.find(base) && base.find(':') == std::string::npos && isFile(base)) base = "external:" + base;
   std::vector<std::string> names = pipeline.roles.bases;
-  for (const std::vector<std::string>& more : {o.choice.wanted(), pipeline.roles.denoisers, {biased}})
+  for (const std::vector<std::string>& more : {o.choice.methods, pipeline.roles.denoisers, {biased}})
     names.insert(names.end(), more.begin(), more.end());
   for (const std::string& name : names)
     if (const size_t at = name.find("external:"); at != std::string::npos) checkExternal(name.substr(at + 9), in);
@@ -170,10 +173,9 @@ void checkOutputs(const CombineOptions& o) {
   addInput(uses, "an input of --unbiased", o.unbiased);
   addInput(uses, "an input of --correlated", o.correlated);
   addInput(uses, "an input of --biased", o.choice.biased);
-  addInput(uses, "an input of --bases", o.choice.bases);
+  for (const std::string& base : o.choice.bases) addInput(uses, "an input of --bases", base);
   uses.input("the reference", o.reference);
-  for (const std::string* methods : {&o.choice.combine, &o.choice.denoisers, &o.choice.biased, &o.choice.bases})
-    uses.methods(*methods);
+  for (const std::string& name : o.choice.names()) uses.method(name);
   uses.output("--output", o.output);
   uses.output("--png", o.png);
   uses.check();
@@ -183,38 +185,28 @@ void checkOutputs(const CombineOptions& o) {
   checkImageFiles(files);
 }
 
-int runCombine(const CombineOptions& o) {
-  const AovSet aovs = parseAovs(o.aovs);
-  checkOutputs(o);
-  const std::vector<std::string> wanted = o.choice.wanted();
-  if (wanted.empty()) throw Error(ExitCode::Usage, "--method: name at least one method (braid --list)");
-  for (const std::string& name : wanted) makeCombinePlan({}, {name}, {});  // unknown names first
-  PipelineOptions pipeline = o.choice.options();
-  Inputs in = readInputs(o, pipeline);
-  Estimates& all = in.estimates;
-  if (!o.quiet)
-    for (const std::string& line : in.notes) fmt::print(stderr, "note: {}\n", line);
-
-  const AvailableEstimates available = availableIn(all);
-  const CombinePlan combinePlan = makeCombinePlan(available, wanted, pipeline.roles);
+// What no method could run without is told before any of them runs. Throws Error(BadInput).
+CombinePlan requireMethods(const Estimates& all, const std::vector<std::string>& wanted,
+                           const CombinePlanOptions& roles) {
+  const CombinePlan combinePlan = makeCombinePlan(availableIn(all), wanted, roles);
   for (const std::string& name : wanted)
     if (const Step* step = combinePlan.find(name); step && !step->skipReason.empty())
-      throw Error(ExitCode::BadInput,
-                  fmt::format("{} cannot run: {}{}", name, step->skipReason, runnable(all, pipeline.roles)));
-  const PipelineResult result = runCombining(all, o.choice, pipeline, o.threads);
-  for (const std::string& name : wanted)
-    if (const PipelineOutput* out = result.find(name); out && !out->ran())
-      throw Error(ExitCode::BadInput, fmt::format("{} cannot run: {}", name, out->step.skipReason));
+      throw Error(ExitCode::BadInput, fmt::format("{} cannot run: {}{}", name, step->skipReason, runnable(all, roles)));
+  return combinePlan;
+}
 
+// Writes the files; the warning, if there is one.
+std::string writeResult(const CombineOptions& o, const PipelineResult& result, Inputs& in) {
+  Estimates& all = in.estimates;
   const Attribute version{"Software", Attribute::Kind::String, std::string("braid ") + BRAID_VERSION, 0, 0, {}};
   const std::vector<Attribute> derived = std::move(all.attributes);
   all.attributes = {version};
   for (const std::vector<Attribute>& list : {estimateAttributes(all, !o.noTiming), derived, viewAttributes(in.head)})
     all.attributes.insert(all.attributes.end(), list.begin(), list.end());
-  const CombinedLayers combined(result, wanted, o.choice.weights, !o.noTiming, all);
+  const CombinedLayers combined(result, o.choice.methods, o.choice.weights, !o.noTiming, all);
   BRAID_ASSERT(combined.headline());
   ExrOptions exr;
-  exr.aovs = aovs;
+  exr.aovs = o.aovs;
   exr.quarters = o.quarters;
   exr.floatHeadline = o.floatHeadline;
   exr.layers = combined.layers();
@@ -222,6 +214,25 @@ int runCombine(const CombineOptions& o) {
   const std::string clamped = writeImageFile(o.output, all, *combined.headline(), alpha, exr, o.exposure);
   if (!o.png.empty())
     writePicture(o.png, ImageFormat::Png, *combined.headline(), alpha, static_cast<float>(o.exposure));
+  return clamped;
+}
+
+int runCombine(const CombineOptions& o) {
+  checkOutputs(o);
+  const std::vector<std::string>& wanted = o.choice.methods;
+  if (wanted.empty()) throw Error(ExitCode::Usage, "--method: name at least one method (braid --list)");
+  for (const std::string& name : wanted) makeCombinePlan({}, {name}, {});  // unknown names first
+  PipelineOptions pipeline = o.choice.options();
+  Inputs in = readInputs(o, pipeline);
+  if (!o.quiet)
+    for (const std::string& line : in.notes) fmt::print(stderr, "note: {}\n", line);
+
+  const CombinePlan combinePlan = requireMethods(in.estimates, wanted, pipeline.roles);
+  const PipelineResult result = runCombining(in.estimates, o.choice, pipeline, o.threads);
+  for (const std::string& name : wanted)
+    if (const PipelineOutput* out = result.find(name); out && !out->ran())
+      throw Error(ExitCode::BadInput, fmt::format("{} cannot run: {}", name, out->step.skipReason));
+  const std::string clamped = writeResult(o, result, in);
   if (o.quiet) return 0;
   for (const std::string& line : combineWarnings(result)) fmt::print(stderr, "warning: {}\n", line);
   if (!clamped.empty()) fmt::print(stderr, "warning: {}\n", clamped);
@@ -233,61 +244,67 @@ int runCombine(const CombineOptions& o) {
   return 0;
 }
 
+void addInputOptions(CLI::App& command, CombineOptions& o) {
+  command
+      .add_option("--unbiased", o.unbiased,
+                  "FILE, or FILE:ESTIMATE of braid's, FILE:LAYER of others'; HALFA,HALFB: two renders with "
+                  "different seeds; or FILE,HALFA,HALFB")
+      ->required()
+      ->type_name("FILES");
+  command.add_option("--correlated", o.correlated, "The same, for the estimate by common random numbers or gradients")
+      ->type_name("FILES");
+  command
+      .add_option("--reference", o.reference,
+                  "Image that the true errors are measured by, for ideal and ensemble-oracle")
+      ->type_name("FILE");
+  addWords(command, "--method", o.choice.methods, parseMethods,
+           "Methods to run, separated by commas; the last one is the image R G B")
+      ->required()
+      ->type_name("NAMES");
+  addCombineOptions(command, o.choice);
+  command.get_option("--biased")
+      ->description("Biased input: a file as for --unbiased, an estimate, a denoiser or another combiner");
+  command
+      .add_option("--spp", o.samplesPerPixel, "Samples per pixel of the unbiased image, where its file does not say")
+      ->check(wholeNumber(1, kMostSamples));
+  showFirst(command, "Inputs", {"--unbiased", "--correlated", "--biased", "--bases", "--method"});
+}
+
+void addOutputOptions(CLI::App& command, CombineOptions& o) {
+  addOutput(command, o.output)->required();
+  command.add_option("--png", o.png, "Also write a tone-mapped PNG")->type_name("FILE");
+  command.add_option("--exposure", o.exposure, "Exposure of PNG and JPEG in stops")
+      ->capture_default_str()
+      ->check(number(-64, 64));
+  addWords(command, "--aovs", o.aovs, parseAovs, "Layers besides the image: none, features or all")
+      ->default_str("all")
+      ->type_name("SET");
+  command.add_flag("--quarters", o.quarters, "Also write the four quarter buffers");
+  command.add_flag("--float", o.floatHeadline, "R G B as 32-bit floats");
+  command.add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
+  addThreads(command, o.threads);
+  command.add_flag("-q,--quiet", o.quiet, "Errors only");
+  showFirst(command, kOutputHelp, {"--output", "--png", "--exposure", "--aovs", "--threads", "--quiet"});
+}
+
+constexpr const char* kCombineHints =
+    "METHOD@INPUT chooses the biased input of one method, e.g. js@ensemble.\n"
+    "Examples:\n"
+    "  braid combine --unbiased out.exr --method js -o js.exr\n"
+    "  braid combine --unbiased out.exr --method js --biased ensemble --bases nfor,nlm -o js.exr\n"
+    "  braid combine --unbiased seed1.exr,seed2.exr --biased denoised.exr --method average -o a.exr\n"
+    "Files of pbrt, Mitsuba 3 and Cycles are read by their channel names. Where one image is all there\n"
+    "is, its variance is estimated from neighbouring pixels, and halves are made from it (the header says\n"
+    "so).";
+
 }  // namespace
 
 void addCombine(CLI::App& app, Action& action) {
   auto options = std::make_shared<CombineOptions>();
-  CombineOptions& o = *options;
   CLI::App* command = app.add_subcommand("combine", "Denoise or combine the images of earlier renders");
-  command
-      ->add_option("--unbiased", o.unbiased,
-                   "FILE, or FILE:ESTIMATE of braid's, FILE:LAYER of others'; HALFA,HALFB: two renders with "
-                   "different seeds; or FILE,HALFA,HALFB")
-      ->required()
-      ->type_name("FILES");
-  command->add_option("--correlated", o.correlated, "The same, for the estimate by common random numbers or gradients")
-      ->type_name("FILES");
-  command
-      ->add_option("--reference", o.reference,
-                   "Image that the true errors are measured by, for ideal and ensemble-oracle")
-      ->type_name("FILE");
-  command
-      ->add_option("--method", o.choice.combine, "Methods to run, separated by commas; the last one is the image R G B")
-      ->required()
-      ->type_name("NAMES");
-  command
-      ->add_option("-o,--output", o.output,
-                   "Image to write, by its ending: .exr with layers; .png, .jpg tone-mapped; .hdr, .tif linear; - is "
-                   "EXR to standard output")
-      ->required()
-      ->type_name("FILE");
-  addCombineOptions(*command, o.choice);
-  command->get_option("--biased")
-      ->description("Biased input: a file as for --unbiased, an estimate, a denoiser or another combiner");
-  command
-      ->add_option("--spp", o.samplesPerPixel, "Samples per pixel of the unbiased image, where its file does not say")
-      ->check(wholeNumber(1, kMostSamples));
-  command->add_option("--png", o.png, "Also write a tone-mapped PNG")->type_name("FILE");
-  command->add_option("--exposure", o.exposure, "Exposure of PNG and JPEG in stops")
-      ->capture_default_str()
-      ->check(number(-64, 64));
-  command->add_option("--aovs", o.aovs, "Layers besides the image: none, features or all")
-      ->capture_default_str()
-      ->type_name("SET");
-  command->add_flag("--quarters", o.quarters, "Also write the four quarter buffers");
-  command->add_flag("--float", o.floatHeadline, "R G B as 32-bit floats");
-  command->add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
-  addThreads(*command, o.threads);
-  command->add_flag("-q,--quiet", o.quiet, "Errors only");
-  command->footer(
-      methodList() +
-      "METHOD@INPUT chooses the biased input of one method, e.g. js@ensemble.\n"
-      "Examples:\n"
-      "  braid combine --unbiased out.exr --method js -o js.exr\n"
-      "  braid combine --unbiased out.exr --method js --biased ensemble --bases nfor,nlm -o js.exr\n"
-      "  braid combine --unbiased seed1.exr,seed2.exr --biased denoised.exr --method average -o a.exr\n"
-      "Files of pbrt, Mitsuba 3 and Cycles are read by their channel names. Where one image is all there is, its\n"
-      "variance is estimated from neighbouring pixels, and halves are made from it (the header says so).");
+  addInputOptions(*command, *options);
+  addOutputOptions(*command, *options);
+  command->footer(kCombineHints);
   command->callback([options, &action] { action = [options] { return runCombine(*options); }; });
 }
 

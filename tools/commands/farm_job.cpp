@@ -8,73 +8,13 @@
 #include <nlohmann/json.hpp>
 
 #include "renderer/core/error.h"
+#include "tools/commands/farm_words.h"
 
 namespace braid {
 
+using namespace farm;
+
 namespace {
-
-using Words = std::vector<std::string>;
-
-// A file name where an option could stand.
-std::string operand(const std::string& file) { return file.starts_with('-') ? "./" + file : file; }
-
-std::string stemOf(const std::string& output) {
-  return output.ends_with(".exr") ? output.substr(0, output.size() - 4) : output;
-}
-
-// --name=value, so that values may begin with a dash.
-void append(Words& words, const std::vector<FarmOption>& options) {
-  for (const FarmOption& o : options) words.push_back(o.value ? o.name + "=" + *o.value : o.name);
-}
-
-// `render` and its options, but for --passes, --checkpoint and --threads.
-Words renderWords(const FarmJob& job) {
-  Words words{"render", operand(job.scene)};
-  append(words, job.render);
-  words.push_back("--resume");
-  return words;
-}
-
-Words mergeOptions(const FarmJob& job) {
-  Words words{"--output=" + job.output};
-  append(words, job.merge);
-  if (job.threads > 0) words.push_back(fmt::format("--threads={}", job.threads));
-  return words;
-}
-
-Words shareWords(const FarmJob& job, uint64_t task, const PassInterval& passes) {
-  Words words = renderWords(job);
-  words.push_back(fmt::format("--passes={}:{}", passes.begin, passes.end));
-  words.push_back("--checkpoint=" + shareFile(job.output, task));
-  if (job.threads > 0) words.push_back(fmt::format("--threads={}", job.threads));
-  return words;
-}
-
-Words mergeWords(const FarmJob& job) {
-  Words words{"merge"};
-  for (uint64_t k = 0; k < job.tasks; ++k) words.push_back(operand(shareFile(job.output, k)));
-  for (const std::string& w : mergeOptions(job)) words.push_back(w);
-  return words;
-}
-
-std::string line(const Words& words) {
-  std::string text;
-  for (const std::string& w : words) text += (text.empty() ? "" : " ") + shellQuoted(w);
-  return text;
-}
-
-// A name that every scheduler takes: letters, digits and underscores.
-std::string jobName(const FarmJob& job) {
-  std::string name = "braid_" + std::filesystem::path(stemOf(job.output)).filename().string();
-  for (char& c : name)
-    if (!((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'))) c = '_';
-  return name;
-}
-
-std::string title(const FarmJob& job) {
-  return fmt::format("braid render of {}: {} samples per pixel in {} shares, and their merge to {}", job.scene, job.spp,
-                     job.tasks, job.output);
-}
 
 void requireCarriable(const FarmJob& job, FarmFormat format) {
   Words words{job.program, job.folder};
@@ -138,11 +78,11 @@ END_OF_MERGE
 ) || {{ scancel "$shares"; exit 1; }}
 echo "shares: job $shares, merge: job ${{merge%%;*}}"
 )",
-      fmt::arg("title", title(job)), fmt::arg("folder", shellQuoted(job.folder)), fmt::arg("name", jobName(job)),
+      fmt::arg("title", jobTitle(job)), fmt::arg("folder", shellQuoted(job.folder)), fmt::arg("name", jobName(job)),
       fmt::arg("last", job.tasks - 1), fmt::arg("passes", passes), fmt::arg("program", shellQuoted(job.program)),
       fmt::arg("cpus", job.threads > 0 ? fmt::format(" --cpus-per-task={}", job.threads) : ""),
-      fmt::arg("render", line(renderWords(job))), fmt::arg("stem", shellQuoted(stemOf(job.output))),
-      fmt::arg("threads", threads), fmt::arg("merge", line(mergeWords(job))),
+      fmt::arg("render", shellLine(renderWords(job))), fmt::arg("stem", shellQuoted(stemOf(job.output))),
+      fmt::arg("threads", threads), fmt::arg("merge", shellLine(mergeWords(job))),
       fmt::arg("merge_threads", job.threads > 0 ? "" : " --threads=" + threads));
 }
 
@@ -156,7 +96,7 @@ std::string makeQuoted(std::string text) {
 std::string makeText(const FarmJob& job, const std::vector<PassInterval>& shares) {
   std::string names, rules;
   const auto command = [&](const Words& words) {
-    return makeQuoted("cd -- " + shellQuoted(job.folder) + " && " + shellQuoted(job.program) + " " + line(words));
+    return makeQuoted("cd -- " + shellQuoted(job.folder) + " && " + shellQuoted(job.program) + " " + shellLine(words));
   };
   for (uint64_t k = 0; k < job.tasks; ++k) {
     names += fmt::format(" share{}", k);
@@ -168,76 +108,9 @@ std::string makeText(const FarmJob& job, const std::vector<PassInterval>& shares
       "# Four shares at a time, each with {}. Run again after an interruption, it goes on from the checkpoints.\n"
       "SHELL = /bin/sh\n"
       "merge:{}\n\t{}\n{}.PHONY: merge{}\n",
-      title(job),
+      jobTitle(job),
       job.threads > 0 ? fmt::format("--threads {}", job.threads) : "all processors unless plan gets --threads", names,
       command(mergeWords(job)), rules, names);
-}
-
-// Cuebot replaces tokens such as #LAYER# in commands before a shell sees them: quotes after every # keep names whole.
-std::string withoutTokens(std::string text) {
-  for (size_t at = 0; (at = text.find('#', at)) != std::string::npos; at += 3) text.insert(at + 1, "''");
-  return text;
-}
-
-// One command for all frames, however many: Cuebot stores at most 4000 characters of it. Share k of n begins at
-// unit * (k * each + min(k, extra)), and the last one ends with the passes.
-std::string openCueText(const FarmJob& job, const std::vector<PassInterval>& shares) {
-  const auto words = [&](const Words& list) {
-    std::string text;
-    for (const std::string& w : list) text += " " + withoutTokens(shellQuoted(w));
-    return text;
-  };
-  const uint64_t unit = job.spp >= 4 * job.tasks ? 4 : job.spp >= 2 * job.tasks ? 2 : 1;
-  const std::string begin = fmt::format("cd -- {} && exec {}", withoutTokens(shellQuoted(job.folder)),
-                                        withoutTokens(shellQuoted(job.program)));
-  const std::string stem = withoutTokens(shellQuoted(stemOf(job.output)));
-  const std::string threads = job.threads > 0 ? std::to_string(job.threads) : "\"${CUE_THREADS:-0}\"";
-  const std::string render = fmt::format(
-      "k=$((#IFRAME#-1)); at() {{ echo $(($1==0 ? 0 : $1=={n} ? {spp} : {unit}*($1*{each}+($1<{extra}?$1:{extra})))); "
-      "}}; {begin}{words} --passes=$(at $k):$(at $((k+1))) --checkpoint={stem}.shard$k.state --threads={threads}",
-      fmt::arg("n", job.tasks), fmt::arg("spp", job.spp), fmt::arg("unit", unit),
-      fmt::arg("each", job.spp / unit / job.tasks), fmt::arg("extra", job.spp / unit % job.tasks),
-      fmt::arg("begin", begin), fmt::arg("words", words(renderWords(job))), fmt::arg("stem", stem),
-      fmt::arg("threads", threads));
-  const std::string merge =
-      fmt::format("set --; while [ $# -lt {} ]; do set -- \"$@\" {}.shard$#.state; done; {} merge \"$@\"{}{}",
-                  job.tasks, withoutTokens(shellQuoted(operand(stemOf(job.output)))), begin, words(mergeOptions(job)),
-                  job.threads > 0 ? "" : " --threads=" + threads);
-  Words commands;
-  for (const std::string& script : {render, merge}) {
-    // Not shellQuoted() of what holds tokens that are meant: its quotes stand before and after, not within them.
-    commands.push_back("/bin/sh -c " + shellQuoted(script));
-    if (commands.back().size() > 4000)
-      throw Error(ExitCode::Usage, fmt::format("OpenCue stores at most 4000 characters of a command, and this one has "
-                                               "{}: use shorter names",
-                                               commands.back().size()));
-  }
-  const std::string cores =
-      job.threads > 0 ? fmt::format(", threads={0}, cores={0}, overrideCores=True", job.threads) : "";
-  return fmt::format(
-      R"(#!/usr/bin/env python3
-# {title}.
-#   python3 THIS_FILE    where OpenCue's packages are installed; SHOW, SHOT and the like as for every outline
-# A share that is retried goes on from its checkpoint. The render hosts need braid and the folder, and no Python package.
-import outline
-import outline.cuerun
-import outline.modules.shell
-
-job = outline.Outline({name})
-shares = outline.modules.shell.Shell(
-    "shares", command=[{render}],
-    range="1-{n}", chunk=1, threadable=True{cores})
-merge = outline.modules.shell.Shell(
-    "merge", command=[{merge}],
-    range="1", chunk=1, threadable=True{cores})
-job.add_layer(shares)
-job.add_layer(merge)
-merge.depend_all(shares)
-outline.cuerun.launch(job, range="1-{n}", use_pycuerun=False)
-)",
-      fmt::arg("title", title(job)), fmt::arg("name", nlohmann::json(jobName(job)).dump()),
-      fmt::arg("n", shares.size()), fmt::arg("render", nlohmann::json(commands[0]).dump()),
-      fmt::arg("merge", nlohmann::json(commands[1]).dump()), fmt::arg("cores", cores));
 }
 
 // Workers run `exec` without a shell; env changes the folder.
@@ -279,7 +152,7 @@ function compileJob(job) {{
   job.addTask(merge);
 }}
 )",
-      fmt::arg("title", title(job)), fmt::arg("name", jobName(job)),
+      fmt::arg("title", jobTitle(job)), fmt::arg("name", jobName(job)),
       fmt::arg("type",
                [&] {
                  std::string type = jobName(job);

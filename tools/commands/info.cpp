@@ -8,6 +8,8 @@
 
 #include "renderer/core/hash.h"
 #include "tools/options/cli.h"
+#include "tools/options/help.h"
+#include "tools/options/open_scene.h"
 
 namespace braid {
 
@@ -97,10 +99,8 @@ void print(const nlohmann::json& j) {
 
 int runInfo(InfoOptions o) {
   o.scene.quiet = o.scene.quiet || o.json;  // warnings are in the record
-  SceneData data = loadScene(o.scene);
-  const CameraData camera = chooseCamera(data, o.scene);
-  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
-  const nlohmann::json record = describe(*scene);
+  const OpenedScene opened = openScene(o.scene);
+  const nlohmann::json record = describe(*opened.scene);
   if (o.json)
     fmt::print("{}\n", record.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   else
@@ -116,6 +116,7 @@ void addInfo(CLI::App& app, Action& action) {
   command->footer("Example:\n  braid info scene.glb --json");
   addSceneOptions(*command, options->scene);
   command->add_flag("--json", options->json, "As JSON");
+  showFirst(*command, kOutputHelp, {"--json"});
   command->callback([options, &action] { action = [options] { return runInfo(*options); }; });
 }
 

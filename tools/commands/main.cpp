@@ -11,8 +11,9 @@
 #include <fmt/format.h>
 
 #include "renderer/core/error.h"
-#include "tools/options/cli.h"
 #include "tools/commands/lists.h"
+#include "tools/options/cli.h"
+#include "tools/options/help.h"
 #include "tools/options/memory_limit.h"
 #include "tools/options/old_spellings.h"
 #include "tools/run/standard_streams.h"
@@ -24,7 +25,7 @@ int run(int argc, char** argv) {
   using namespace braid;
   CLI::App app{"braid: renders glTF scenes to converged OpenEXR images on the CPU", argc > 0 ? argv[0] : "braid"};
   app.set_version_flag("--version", std::string("braid ") + BRAID_VERSION + " (" + BRAID_BUILD_FLAGS + ")");
-  app.set_help_flag("-h,--help", "Print this help and exit");
+  app.set_help_flag("-h,--help", "Help; -h METHOD: of a denoiser or combiner");
   MainOptions options;
   Action action;
   addCommands(app, options, action);
@@ -32,6 +33,10 @@ int run(int argc, char** argv) {
   try {
     std::vector<std::string> arguments = presentSpellings(argc, argv);
     arguments.erase(arguments.begin());
+    if (const std::optional<HelpRequest> help = findHelp(app, arguments)) {
+      fmt::print("{}", helpText(app, *help));
+      return 0;
+    }
     std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
     app.parse(std::move(arguments));
     if (options.list) return printLists();
@@ -39,7 +44,7 @@ int run(int argc, char** argv) {
       fmt::print("{}", app.help());
       return static_cast<int>(ExitCode::Usage);
     }
-    if (!options.memoryLimit.empty()) limitMemory(parseBytes(options.memoryLimit));
+    if (options.memoryLimit > 0) limitMemory(options.memoryLimit);
     return action();
   } catch (const CLI::ValidationError& e) {
     fmt::print(stderr, "{}\n", printable(e.what()));

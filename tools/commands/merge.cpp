@@ -10,6 +10,7 @@
 #include "renderer/film/files/state_file.h"
 #include "tools/options/cli.h"
 #include "tools/options/file_uses.h"
+#include "tools/options/help.h"
 #include "tools/publish/exr_metadata.h"
 #include "tools/publish/image_output.h"
 #include "tools/options/option_checks.h"
@@ -83,29 +84,47 @@ FilmState sumOf(const std::vector<Part>& parts) {
 
 // Throws Error(BadInput) for a wanted method that cannot run on what the states hold.
 void requireInputs(const Estimates& estimates, const CombineChoice& choice) {
-  const CombinePlan combinePlan = makeCombinePlan(availableIn(estimates), choice.wanted(), choice.options().roles);
-  for (const std::string& name : choice.wanted())
+  const CombinePlan combinePlan = makeCombinePlan(availableIn(estimates), choice.methods, choice.options().roles);
+  for (const std::string& name : choice.methods)
     if (const Step* step = combinePlan.find(name); step && !step->skipReason.empty())
       throw Error(ExitCode::BadInput, fmt::format("{} cannot run on these shares: {}: render them with --combine {}",
                                                   name, step->skipReason, name));
 }
 
-int runMerge(const MergeOptions& o) {
-  o.image.aovSet();
-  for (const std::string& name : o.image.combine.wanted()) makeCombinePlan({}, {name}, {});  // unknown names first
-  std::vector<std::string> outputs = o.image.files();
-  if (!o.checkpoint.empty()) outputs.push_back(o.checkpoint);
-  if (outputs.empty()) throw Error(ExitCode::Usage, "nothing to write: give -o OUT.exr, --png or --checkpoint");
+std::vector<std::string> filesOf(const MergeOptions& o) {
+  std::vector<std::string> files = o.image.files();
+  if (!o.checkpoint.empty()) files.push_back(o.checkpoint);
+  return files;
+}
+
+void checkOutputs(const MergeOptions& o) {
+  if (filesOf(o).empty()) throw Error(ExitCode::Usage, "nothing to write: give -o OUT.exr, --png or --checkpoint");
   FileUses uses;
   for (const std::string& part : o.parts) uses.input("a share", part);
-  uses.methods(o.image.combine.combine);
+  for (const std::string& name : o.image.combine.names()) uses.method(name);
   uses.output("--output", o.image.file);
   uses.output("--png", o.image.png);
   uses.output("--checkpoint", o.checkpoint);
   uses.check();
   checkImageFiles(o.image);
   if (!o.checkpoint.empty()) prepareOutput(o.checkpoint);
+}
 
+void sayResult(const MergeOptions& o, const WrittenImage& written, const std::vector<PassInterval>& passes,
+               uint64_t samples) {
+  for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
+  for (const std::string& text : written.timings) fmt::print(stderr, "{}\n", text);
+  for (const std::string& file : filesOf(o)) fmt::print(stderr, "Saved: {}\n", file);
+  std::string intervals;
+  for (const PassInterval& i : passes)
+    intervals += fmt::format("{}{}:{}", intervals.empty() ? "" : " and ", i.begin, i.end);
+  fmt::print(stderr, "{} spp of {} shares, passes {}{}\n", samples, o.parts.size(), intervals,
+             written.error ? fmt::format(", estimated error {:.3g}", *written.error) : "");
+}
+
+int runMerge(const MergeOptions& o) {
+  for (const std::string& name : o.image.combine.methods) makeCombinePlan({}, {name}, {});  // unknown names first
+  checkOutputs(o);
   FilmState state = sumOf(sortedParts(o.parts, o.quiet));
   const std::vector<PassInterval> passes = state.estimates.front().passes;
   const uint64_t samples = state.estimates.front().sums.passes();
@@ -120,15 +139,7 @@ int runMerge(const MergeOptions& o) {
     state = {};  // what it held is what combiners take
     written = writeImage(o.image, estimates, alpha ? &*alpha : nullptr, o.threads);
   }
-  if (o.quiet) return 0;
-  for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
-  for (const std::string& text : written.timings) fmt::print(stderr, "{}\n", text);
-  for (const std::string& file : outputs) fmt::print(stderr, "Saved: {}\n", file);
-  std::string intervals;
-  for (const PassInterval& i : passes)
-    intervals += fmt::format("{}{}:{}", intervals.empty() ? "" : " and ", i.begin, i.end);
-  fmt::print(stderr, "{} spp of {} shares, passes {}{}\n", samples, o.parts.size(), intervals,
-             written.error ? fmt::format(", estimated error {:.3g}", *written.error) : "");
+  if (!o.quiet) sayResult(o, written, passes, samples);
   return 0;
 }
 
@@ -145,12 +156,14 @@ void addMerge(CLI::App& app, Action& action) {
   command->add_option("PART", o.parts, "States that `braid render --passes A:B --checkpoint PART` wrote")
       ->required()
       ->type_name("FILE");
-  o.image.aovs = "all";
+  o.image.aovs = AovSet::All;
   addImageOptions(*command, o.image);
   command->add_option("--checkpoint", o.checkpoint, "Also write the sum as a state, to resume or merge on")
       ->type_name("FILE");
   addThreads(*command, o.threads);
   command->add_flag("-q,--quiet", o.quiet, "Errors only");
+  showFirst(*command, kMessageHelp, {"--quiet"});
+  showFirst(*command, kOutputHelp, {"--checkpoint", "--threads"});
   command->callback([options, &action] { action = [options] { return runMerge(*options); }; });
 }
 

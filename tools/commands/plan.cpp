@@ -7,17 +7,17 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "integrators/registry.h"
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
 #include "renderer/film/files/output_file.h"
 #include "renderer/film/files/picture.h"
-#include "tools/options/cli.h"
 #include "tools/commands/farm_job.h"
-#include "tools/publish/image_output.h"
+#include "tools/options/cli.h"
+#include "tools/options/help.h"
 #include "tools/options/option_checks.h"
 #include "tools/options/output_options.h"
-#include "tools/publish/render_plan.h"
+#include "tools/publish/image_output.h"
+#include "tools/publish/prepared_render.h"
 
 namespace braid {
 
@@ -28,10 +28,12 @@ struct PlanOptions {
   SampleChoice samples;
   ImageOutput image;
   bool transparent = false, json = false;
-  std::string saveEvery, checkpoint;
   // A job for a farm instead of the plan.
   uint64_t tasks = 0;
-  std::string format, program;
+  std::optional<FarmFormat> format;
+  std::string program, checkpoint;
+  double saveSeconds = 0;
+  const CLI::Option* saveEvery = nullptr;  // of which the job gets the words
   // The command's own options, to carry on what was given: those of the scene and samples, then those of the image.
   std::vector<const CLI::Option*> renderOptions, imageOptions;
 };
@@ -73,17 +75,17 @@ FarmJob farmJob(const PlanOptions& o, const Settings& planned) {
   job.threads = o.samples.threads;
   carry(o.renderOptions, {"spp", "threads"}, job.render);
   carry(o.imageOptions,
-        {"output", "png", "exposure", "aovs", "quarters", "history", "light-parts", "float", "layer-prefix", "weights",
-         "reproducible"},
+        {"output", "png", "exposure", "aovs", "quarters", "history", "direct-indirect", "float", "layer-prefix",
+         "weights", "reproducible"},
         job.render);
   if (o.transparent) job.render.push_back({"--transparent", std::nullopt});
-  if (!o.saveEvery.empty()) job.render.push_back({"--save-every", o.saveEvery});
+  carry({o.saveEvery}, {}, job.render);
   if (planned.keep.quarters) job.render.push_back({"--quarters", std::nullopt});
   if (planned.keep.directIndirect) job.render.push_back({"--direct-indirect", std::nullopt});
   if (planned.keep.history) job.render.push_back({"--history", std::nullopt});
   job.render.push_back({"--aovs", planned.keep.features ? "features" : "none"});
   carry(o.imageOptions, {"output", "combine", "aovs"}, job.merge);
-  job.merge.push_back({"--combine", o.image.combine.combine});
+  job.merge.push_back({"--combine", o.image.combine.text()});
   job.merge.push_back({"--aovs", nameOf(o.image.aovSet())});
   if (!o.checkpoint.empty()) job.merge.push_back({"--checkpoint", o.checkpoint});
   if (o.scene.quiet) job.merge.push_back({"--quiet", std::nullopt});
@@ -91,42 +93,19 @@ FarmJob farmJob(const PlanOptions& o, const Settings& planned) {
 }
 
 void checkJobOptions(const PlanOptions& o) {
-  if (o.tasks == 0 && o.format.empty()) return;
+  if (o.tasks == 0 && !o.format) return;
   const auto refuse = [](const char* text) { throw Error(ExitCode::Usage, text); };
   if (o.tasks == 0) refuse("--format: give --tasks, the number of shares");
-  if (o.format.empty()) refuse("--tasks: give --format slurm, opencue, flamenco or make");
+  if (!o.format) refuse("--tasks: give --format slurm, opencue, flamenco or make");
   if (o.json) refuse("--json and --tasks: a job is no JSON");
   if (o.image.file.empty()) refuse("--tasks: name the merged image with -o OUT.exr");
   if (o.image.file == kStandardOutput || o.image.png == kStandardOutput)
     refuse("--tasks: standard output gets the job: give the merged image another name");
-  if (!o.samples.time.empty()) refuse("--time: shares are made of passes, so give --spp alone");
-  parseFarmFormat(o.format);
+  if (o.samples.seconds > 0) refuse("--time: shares are made of passes, so give --spp alone");
 }
 
-int runPlan(PlanOptions o) {
-  checkJobOptions(o);
-  if (!o.image.file.empty()) imageFormat(o.image.file);
-  Settings settings = makeSettings(o.scene, o.samples);
-  settings.keep = o.image.buffers();
-  settings.transparent = o.transparent;
-  if (o.tasks > 0) splitPasses(settings.spp, o.tasks);  // wrong numbers before the scene is loaded
-  SceneData data = loadScene(o.scene);
-  const CameraData camera = chooseCamera(data, o.scene);
-  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
-  const auto integrators = makeIntegrators();
-  const bool shares = o.tasks > 0;
-  const RenderPlan planned = planRender(*scene, camera, settings, pointersTo(integrators), o.image.combine,
-                                        {settings.spp, shares || !o.checkpoint.empty()});
-  if (shares) {
-    requireRunnable(planned.combinePlan, o.image.combine.wanted());
-    fmt::print("{}", farmJobText(farmJob(o, planned.plan.settings), parseFarmFormat(o.format)));
-    return 0;
-  }
-  if (!o.json) {
-    fmt::print("{}", planned.text());
-    return 0;
-  }
-  const auto& [plan, combinePlan, memory, note] = planned;
+void printRecord(const PreparedRender& render, const std::string& file) {
+  const auto& [plan, combinePlan, memory, note] = render.planned;
   nlohmann::json lines = nlohmann::json::array();
   for (const PlanLine& line : plan.lines)
     lines.push_back({{"kept", line.kept}, {"subject", line.subject}, {"reason", line.reason}});
@@ -135,36 +114,75 @@ int runPlan(PlanOptions o) {
     combiners.push_back({{"kept", step.skipReason.empty()}, {"subject", step.name}, {"reason", step.skipReason}});
   nlohmann::json bytes = {{"filmPerPixel", plan.filmBytesPerPixel}, {"total", memory.total()}};
   for (const MemoryItem& item : memory.items) bytes[item.use] = item.bytes;
-  const nlohmann::json record = {{"schema", 1},         {"scene", o.scene.file},  {"traits", scene->traits().names()},
-                                 {"plan", lines},       {"combiners", combiners}, {"hash", hexString(plan.hash())},
-                                 {"memoryBytes", bytes}};
+  const nlohmann::json record = {
+      {"schema", 1},         {"scene", file},          {"traits", render.scene().traits().names()},
+      {"plan", lines},       {"combiners", combiners}, {"hash", hexString(plan.hash())},
+      {"memoryBytes", bytes}};
   fmt::print("{}\n", record.dump(2));
+}
+
+int runPlan(PlanOptions o) {
+  checkJobOptions(o);
+  if (!o.image.file.empty()) imageFormat(o.image.file);
+  Settings settings = makeSettings(o.scene, o.samples);
+  settings.keep = o.image.buffers();
+  settings.transparent = o.transparent;
+  const bool shares = o.tasks > 0;
+  if (shares) splitPasses(settings.spp, o.tasks);  // wrong numbers before the scene is loaded
+  const PreparedRender render =
+      prepareRender(o.scene, settings, o.image.combine, {settings.spp, shares || !o.checkpoint.empty()});
+  if (shares) {
+    requireRunnable(render.planned.combinePlan, o.image.combine.methods);
+    fmt::print("{}", farmJobText(farmJob(o, render.planned.plan.settings), *o.format));
+  } else if (o.json) {
+    printRecord(render, o.scene.file);
+  } else {
+    fmt::print("{}", render.planned.text());
+  }
   return 0;
 }
+
+void addJobOptions(CLI::App& command, PlanOptions& o) {
+  command.add_option("--tasks", o.tasks, "Print a job of this many shares instead of the plan")
+      ->check(wholeNumber(1, 100000));
+  addWords(command, "--format", o.format, parseFarmFormat,
+           "The farm that the job is for: slurm, opencue, flamenco or make")
+      ->type_name("NAME");
+  command.add_option("--program", o.program, "The braid that the machines run (default: this one, by its full path)")
+      ->type_name("FILE");
+  o.saveEvery = addParsed(command, "--save-every", o.saveSeconds, parseDuration,
+                          "How often shares save their checkpoints (default: as render)")
+                    ->type_name("DURATION");
+  command.add_option("--checkpoint", o.checkpoint, "Also write the merged sums as a state, to resume or merge on")
+      ->type_name("FILE");
+  showFirst(command, "Job for a farm", {"--tasks", "--format", "--program", "--save-every", "--checkpoint"});
+}
+
+constexpr const char* kPlanHints =
+    "Takes the options of `braid render`. With --tasks and --format, standard output is a job: shares of\n"
+    "the passes that go on from their checkpoints when started again, and a merge that waits for them. It\n"
+    "runs in the folder where it was printed, which all machines have to share.\n"
+    "Examples:\n"
+    "  braid plan scene.glb\n"
+    "  braid plan scene.glb -o out.exr --spp 4096 --tasks 16 --format slurm > job.sh\n"
+    "      bash job.sh --partition=long --time=8:00:00       (options of sbatch)\n"
+    "  braid plan scene.glb -o out.exr --spp 1024 --threads 4 --tasks 8 --format make > job.mk\n"
+    "      make -j2 -f job.mk\n"
+    "  braid plan scene.glb -o out.exr --spp 4096 --tasks 16 --format opencue > job.py\n"
+    "      SHOW=testing python3 job.py\n"
+    "  braid plan scene.glb -o out.exr --spp 4096 --tasks 16 --format flamenco > braid_out.js\n"
+    "      (a job type for Flamenco Manager's folder scripts; the file says how to submit)";
 
 }  // namespace
 
 void addPlan(CLI::App& app, Action& action) {
   auto options = std::make_shared<PlanOptions>();
   PlanOptions& o = *options;
-  o.samples.integrators = "auto";
+  o.samples.integrators = {"auto"};
   combineByDefault(o.image.combine);
   CLI::App* command =
       app.add_subcommand("plan", "Print what a render would keep and leave out, and why; or a job for a farm");
-  command->footer(
-      "Takes the options of `braid render`. With --tasks and --format, standard output is a job: shares of the passes\n"
-      "that go on from their checkpoints when started again, and a merge that waits for them. It runs in the folder\n"
-      "where it was printed, which all machines have to share.\n"
-      "Examples:\n"
-      "  braid plan scene.glb\n"
-      "  braid plan scene.glb -o out.exr --spp 4096 --tasks 16 --format slurm > job.sh\n"
-      "      bash job.sh --partition=long --time=8:00:00       (options of sbatch)\n"
-      "  braid plan scene.glb -o out.exr --spp 1024 --threads 4 --tasks 8 --format make > job.mk\n"
-      "      make -j2 -f job.mk\n"
-      "  braid plan scene.glb -o out.exr --spp 4096 --tasks 16 --format opencue > job.py\n"
-      "      SHOW=testing python3 job.py\n"
-      "  braid plan scene.glb -o out.exr --spp 4096 --tasks 16 --format flamenco > braid_out.js\n"
-      "      (a job type for Flamenco Manager's folder scripts; the file says how to submit)");
+  command->footer(kPlanHints);
   o.renderOptions = added(*command, [&] {
     addSceneOptions(*command, o.scene);
     addSampleOptions(*command, o.samples);
@@ -172,23 +190,8 @@ void addPlan(CLI::App& app, Action& action) {
   o.imageOptions = added(*command, [&] { addImageOptions(*command, o.image); });
   command->add_flag("--transparent", o.transparent, "Alpha channel; camera rays that miss add nothing");
   command->add_flag("--json", o.json, "As JSON");
-  const char* group = "Job for a farm";
-  command->add_option("--tasks", o.tasks, "Print a job of this many shares instead of the plan")
-      ->check(wholeNumber(1, 100000))
-      ->group(group);
-  command->add_option("--format", o.format, "The farm that the job is for: slurm, opencue, flamenco or make")
-      ->type_name("NAME")
-      ->group(group);
-  command->add_option("--program", o.program, "The braid that the machines run (default: this one, by its full path)")
-      ->type_name("FILE")
-      ->group(group);
-  command->add_option("--save-every", o.saveEvery, "How often shares save their checkpoints (default: as render)")
-      ->check(duration(true))
-      ->type_name("DURATION")
-      ->group(group);
-  command->add_option("--checkpoint", o.checkpoint, "Also write the merged sums as a state, to resume or merge on")
-      ->type_name("FILE")
-      ->group(group);
+  showFirst(*command, kOutputHelp, {"--transparent", "--json"});
+  addJobOptions(*command, o);
   command->callback([options, command, &action] {
     noteWhoAsked(*command, options->image.combine);
     action = [options] { return runPlan(*options); };

@@ -9,26 +9,23 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "integrators/registry.h"
 #include "renderer/core/error.h"
 #include "renderer/core/stopwatch.h"
 #include "renderer/film/files/output_file.h"
 #include "renderer/images/open_images.h"
 #include "tools/options/cli.h"
-#include "tools/options/combining.h"
 #include "tools/options/file_uses.h"
-#include "tools/publish/exr_metadata.h"
-#include "tools/run/interrupt.h"
+#include "tools/options/help.h"
 #include "tools/options/option_checks.h"
 #include "tools/preview/preview_board.h"
 #include "tools/preview/preview_feed.h"
 #include "tools/preview/preview_server.h"
-#include "tools/run/progress_line.h"
+#include "tools/publish/exr_metadata.h"
+#include "tools/publish/prepared_render.h"
 #include "tools/publish/publisher.h"
-#include "tools/publish/render_plan.h"
-#include "tools/publish/scene_identity.h"
 #include "tools/publish/tev_client.h"
-#include "version.h"
+#include "tools/run/interrupt.h"
+#include "tools/run/progress_line.h"
 
 namespace braid {
 
@@ -42,13 +39,13 @@ struct PreviewOptions {
   SceneChoice scene;
   SampleChoice samples;
   ImageOutput image;
-  std::string tev;
+  std::optional<TevAddress> tev;
   int port = -1;  // -1: none is asked for
 };
 
 Settings previewSettings(const PreviewOptions& o) {
   Settings settings = makeSettings(o.scene, o.samples);
-  if (o.samples.spp == 0 && o.samples.time.empty()) settings.spp = 0;  // until it is stopped
+  if (o.samples.spp == 0 && o.samples.seconds == 0) settings.spp = 0;  // until it is stopped
   settings.keep = o.image.buffers();
   return settings;
 }
@@ -60,7 +57,7 @@ class Audience {
       : quiet_(o.scene.quiet),
         title_(std::filesystem::path(o.scene.file).filename().string()),
         board_(title_, o.image.files(), o.image.exposure) {
-    if (!o.tev.empty()) tev_.emplace(o.tev);
+    if (o.tev) tev_.emplace(*o.tev);
     if (o.port < 0 && tev_) return;
     serve(o.port, [&stop] { stop = true; });
     std::FILE* to = o.image.file == kStandardOutput || o.image.png == kStandardOutput ? stderr : stdout;
@@ -112,8 +109,8 @@ class Audience {
   std::optional<PreviewServer> server_;
 };
 
-void tellSaved(const PreviewOptions& o, const RunReport& result, const WrittenImage& written,
-               const std::string& reason) {
+void saySaved(const PreviewOptions& o, const RunReport& result, const WrittenImage& written,
+              const std::string& reason) {
   if (o.scene.quiet) return;
   for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
   for (const std::string& file : o.image.files()) fmt::print(stderr, "Saved: {}\n", file);
@@ -142,8 +139,37 @@ void checkOutputs(const PreviewOptions& o) {
   checkImageFiles(o.image);
 }
 
+// The passes, until a limit, the page or a signal ends them.
+RunReport showPasses(const PreviewOptions& o, Session& session, Audience& audience, OpeningImages& images,
+                     const std::atomic<bool>& stop, const std::atomic<bool>& interrupted) {
+  const bool writesImages = !o.image.files().empty();
+  if (writesImages) images.check();
+  const bool knowsErrors = session.plan().unreachable.empty();
+  PreviewFeed feed(
+      o.image.combine, session, session.plan().settings.threads,
+      [&](uint64_t spp, double seconds, ImageViews v) {
+        // Light that is missing leaves no trace in the samples: their error is not known.
+        if (!knowsErrors) v.noisyError = v.combinedError = nullptr;
+        audience.show(spp, seconds, v);
+      },
+      [&](const std::string& text) { audience.warn(text); });
+  ProgressLine line(o.scene.quiet);
+  const RunReport result = session.advance(
+      [&](const Progress& p) {
+        feed.round(p);
+        if (writesImages) images.check();
+        audience.board().progress(p);
+        audience.passWarningsOn();
+        line.update(p);
+        return !stop;
+      },
+      &interrupted);
+  line.finish();
+  return result;
+}
+
 int runPreview(PreviewOptions o) {
-  Settings settings = previewSettings(o);
+  const Settings settings = previewSettings(o);
   checkOutputs(o);
   const std::atomic<bool>& interrupted = installInterruptHandler();
   std::atomic<bool> stop{false};
@@ -153,74 +179,46 @@ int runPreview(PreviewOptions o) {
   setpriority(PRIO_PROCESS, 0, 5);
 
   OpeningImages images;
-  SceneData data = loadScene(o.scene);
-  const CameraData camera = chooseCamera(data, o.scene);
-  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
-  const auto integrators = makeIntegrators();
-  const RenderPlan plan =
-      planRender(*scene, camera, settings, pointersTo(integrators), o.image.combine, {settings.spp});
-  requireRunnable(plan.combinePlan, o.image.combine.wanted());
-  if (!plan.note.empty()) audience.warn(fmt::format("nothing is combined: {}", plan.note));
-  requireWithinLimit(plan.memory);
-  Session session(*scene, plan.plan);
-  session.identify(BRAID_VERSION, BRAID_BUILD_FLAGS, sceneIdentity(o.scene, scene->data()),
-                   planAttributes(*scene, session.plan(), scene->accel().isa()));
-  if (o.scene.verbose) fmt::print(stderr, "{}", plan.text());
-  audience.board().setPlan(plan.text(), o.image.combine.combine, static_cast<int>(session.plan().integrators.size()));
-  if (!session.plan().unreachable.empty()) audience.warn(session.plan().unreachable);
+  const PreparedRender render = prepareRender(o.scene, settings, o.image.combine, {settings.spp});
+  const PlannedRender& planned = render.planned;
+  requireRunnable(planned.combinePlan, o.image.combine.methods);
+  if (!planned.note.empty()) audience.warn(fmt::format("nothing is combined: {}", planned.note));
+  const std::unique_ptr<Session> session = beginSession(render, o.scene);
+  if (o.scene.verbose) fmt::print(stderr, "{}", planned.text());
+  const Plan& plan = session->plan();
+  audience.board().setPlan(planned.text(), o.image.combine.text(), static_cast<int>(plan.integrators.size()));
+  if (!plan.unreachable.empty()) audience.warn(plan.unreachable);
   audience.board().setPhase(PreviewPhase::Rendering);
+  const RunReport result = showPasses(o, *session, audience, images, stop, interrupted);
 
-  const bool writesImages = !o.image.files().empty();
-  if (writesImages) images.check();
-  ProgressLine line(o.scene.quiet);
-  RunReport result;
-  {
-    PreviewFeed feed(
-        o.image.combine, session, settings.threads,
-        [&](uint64_t spp, double seconds, ImageViews v) {
-          // Light that is missing leaves no trace in the samples: their error is not known.
-          if (!session.plan().unreachable.empty()) v.noisyError = v.combinedError = nullptr;
-          audience.show(spp, seconds, v);
-        },
-        [&](const std::string& text) { audience.warn(text); });
-    result = session.advance(
-        [&](const Progress& p) {
-          feed.round(p);
-          if (writesImages) images.check();
-          audience.board().progress(p);
-          audience.passWarningsOn();
-          line.update(p);
-          return !stop;
-        },
-        &interrupted);
-  }
-  line.finish();
   const bool cancelled = result.reason == StopReason::Cancelled && !stop;
-  const WrittenImage written = save(o, session, result, audience, cancelled);
+  const WrittenImage written = save(o, *session, result, audience, cancelled);
   const std::string reason = stop ? "the page" : cancelled ? "a signal" : toString(result.reason);
-  tellSaved(o, result, written, reason);
+  saySaved(o, result, written, reason);
   audience.board().end(reason, o.image.files());
   audience.sayFarewell(interrupted);
   return cancelled ? static_cast<int>(ExitCode::Interrupted) : 0;
 }
+
+constexpr const char* kPreviewHints =
+    "Without --spp and --time it goes on until it is stopped: by the button of the page, or by Ctrl-C.\n"
+    "Examples:\n"
+    "  braid preview scene.glb                                 (then open the address that it prints)\n"
+    "  braid preview scene.glb --http 8080 --size 1280x720 -o out.exr --png out.png\n"
+    "  braid preview scene.glb --http 0 --integrator pt,sppm --combine js@sppm --time 5m\n"
+    "  braid preview scene.glb --tev 127.0.0.1:14158\n"
+    "On another machine: ssh -L 8080:127.0.0.1:8080 HOST, then http://127.0.0.1:8080 here.";
 
 }  // namespace
 
 void addPreview(CLI::App& app, Action& action) {
   auto options = std::make_shared<PreviewOptions>();
   PreviewOptions& o = *options;
-  o.scene.size = "640x360";
-  o.samples.integrators = "auto";
+  o.scene.size = {640, 360};
+  o.samples.integrators = {"auto"};
   combineByDefault(o.image.combine);
   CLI::App* command = app.add_subcommand("preview", "Watch a scene converge, in a browser or in tev");
-  command->footer(
-      "Without --spp and --time it goes on until it is stopped: by the button of the page, or by Ctrl-C.\n"
-      "Examples:\n"
-      "  braid preview scene.glb                                 (then open the address that it prints)\n"
-      "  braid preview scene.glb --http 8080 --size 1280x720 -o out.exr --png out.png\n"
-      "  braid preview scene.glb --http 0 --integrator pt,sppm --combine js@sppm --time 5m\n"
-      "  braid preview scene.glb --tev 127.0.0.1:14158\n"
-      "On another machine: ssh -L 8080:127.0.0.1:8080 HOST, then http://127.0.0.1:8080 here.");
+  command->footer(kPreviewHints);
   addSceneOptions(*command, o.scene);
   addSampleOptions(*command, o.samples);
   addImageOptions(*command, o.image);
@@ -231,9 +229,9 @@ void addPreview(CLI::App& app, Action& action) {
                                kPort))
       ->check(wholeNumber(0, 65535))
       ->type_name("PORT");
-  command->add_option("--tev", o.tev, "Show the images in tev, which listens there")
-      ->check(readBy(parseTevAddress))
+  addParsed(*command, "--tev", o.tev, parseTevAddress, "Show the images in tev, which listens there")
       ->type_name("HOST:PORT");
+  showFirst(*command, "Viewers", {"--http", "--tev"});
   command->callback([options, command, &action] {
     noteWhoAsked(*command, options->image.combine);
     action = [options] { return runPreview(*options); };

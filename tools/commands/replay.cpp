@@ -13,6 +13,8 @@
 #include "renderer/film/files/picture.h"
 #include "tools/options/cli.h"
 #include "tools/options/file_uses.h"
+#include "tools/options/help.h"
+#include "tools/options/open_scene.h"
 #include "tools/options/option_checks.h"
 #include "tools/options/output_options.h"
 
@@ -24,7 +26,8 @@ struct ReplayOptions {
   SceneChoice scene;
   SampleChoice samples;
   uint64_t pass = 0;
-  std::string pixel, strategies;
+  std::optional<std::pair<int, int>> pixel;
+  std::string strategies;
 };
 
 std::string show(const glm::dvec3& v) { return fmt::format("({:.13g} {:.13g} {:.13g})", v.x, v.y, v.z); }
@@ -115,19 +118,18 @@ void checkStrategies(const ReplayOptions& o) {
 int runReplay(const ReplayOptions& o) {
   const Settings settings = makeSettings(o.scene, o.samples);
   const bool bidirectional = settings.integrators.front() == "bdpt";
-  if (o.strategies.empty() == o.pixel.empty() || (!o.strategies.empty() && !bidirectional))
+  if (o.strategies.empty() == !o.pixel || (!o.strategies.empty() && !bidirectional))
     throw Error(ExitCode::Usage, "give --pixel X,Y, or --integrator bdpt --strategies FILE");
-  const auto [x, y] = o.pixel.empty() ? std::pair(0, 0) : parsePixel(o.pixel);
+  const auto [x, y] = o.pixel.value_or(std::pair(0, 0));
   if (x >= settings.width || y >= settings.height)
-    throw Error(ExitCode::Usage, fmt::format("--pixel '{}': expected X,Y inside the {}x{} frame", o.pixel,
+    throw Error(ExitCode::Usage, fmt::format("--pixel '{},{}': expected X,Y inside the {}x{} frame", x, y,
                                              settings.width, settings.height));
   if (!o.strategies.empty()) checkStrategies(o);
-  SceneData data = loadScene(o.scene);
-  const CameraData camera = chooseCamera(data, o.scene);
-  const std::unique_ptr<Scene> scene = buildScene(std::move(data), o.scene, camera);
+  const OpenedScene opened = openScene(o.scene);
+  const Scene& scene = *opened.scene;
   const auto integrators = makeIntegrators();
-  const Plan plan = makePlan(*scene, camera, settings, pointersTo(integrators));
-  const TransportContext context(*scene, settings.lightStrategy);
+  const Plan plan = makePlan(scene, opened.camera, settings, pointersTo(integrators));
+  const TransportContext context(scene, settings.lightStrategy);
   const Integrator& integrator = *plan.integrators.front().integrator;
   if (!o.strategies.empty()) {
     writeStrategies(context, plan, o.strategies);
@@ -135,7 +137,7 @@ int runReplay(const ReplayOptions& o) {
   }
   if (bidirectional) {
     fmt::print("bdpt pass {} pixel {},{} of {}x{}\n", o.pass, x, y, settings.width, settings.height);
-    PrintingStrategies printer(scene->data().origin);
+    PrintingStrategies printer(scene.data().origin);
     replayBidirectionalPixel({context, plan, o.pass}, x, y, printer);
     return 0;
   }
@@ -143,7 +145,7 @@ int runReplay(const ReplayOptions& o) {
   if (!sampler)
     throw Error(ExitCode::Usage, fmt::format("integrator '{}' has no camera paths to replay", integrator.name()));
 
-  PrintingObserver observer(*scene);
+  PrintingObserver observer(scene);
   PathKernel kernel(context, plan, *sampler, nullptr, integrator.roulette());
   kernel.observe(&observer);
   fmt::print("{} pass {} pixel {},{} of {}x{}\n", integrator.name(), o.pass, x, y, settings.width, settings.height);
@@ -159,21 +161,20 @@ void addReplay(CLI::App& app, Action& action) {
   auto options = std::make_shared<ReplayOptions>();
   CLI::App* command = app.add_subcommand("replay", "Follow one path of a render, vertex by vertex");
   command->footer(
-      "Examples:\n  braid replay scene.glb --pass 17 --pixel 200,131\n  braid replay scene.glb --integrator bdpt --spp "
-      "64 "
-      "--strategies ways.exr");
+      "Examples:\n"
+      "  braid replay scene.glb --pass 17 --pixel 200,131\n"
+      "  braid replay scene.glb --integrator bdpt --spp 64 --strategies ways.exr");
   addSceneOptions(*command, options->scene);
   addSampleOptions(*command, options->samples);
   command->add_option("--pass", options->pass, "Index of the pass")
       ->capture_default_str()
       ->check(wholeNumber(0, kMaxPass));
-  command->add_option("--pixel", options->pixel, "Pixel of the full frame")
-      ->check(readBy(parsePixel))
-      ->type_name("X,Y");
+  addParsed(*command, "--pixel", options->pixel, parsePixel, "Pixel of the full frame")->type_name("X,Y");
   command
       ->add_option("--strategies", options->strategies,
                    "EXR with the image of every way (s, t) of bdpt to find light, over --spp passes")
       ->type_name("FILE");
+  showFirst(*command, "Path", {"--pass", "--pixel", "--strategies"});
   command->callback([options, &action] { action = [options] { return runReplay(*options); }; });
 }
 

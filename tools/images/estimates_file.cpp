@@ -43,7 +43,7 @@ void deriveStatistics(Estimates& all, const std::string& file, std::vector<std::
   };
   if (noVariance) {
     e.variance = spatialVariance(e.mean, all.features ? &*all.features : nullptr);
-    tell("variance", "estimated from the differences of neighbouring pixels, as the file tells none");
+    tell("variance", "estimated from the differences of neighbouring pixels, as the file holds none");
   }
   if (noHalves) {
     makeHalves(e);

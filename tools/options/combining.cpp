@@ -15,8 +15,9 @@
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 #include "renderer/film/error_map.h"
-#include "tools/options/cli.h"
+#include "tools/options/help.h"
 #include "tools/options/option_checks.h"
+#include "tools/options/option_texts.h"
 
 namespace braid {
 
@@ -62,15 +63,25 @@ AvailableEstimates plannedEstimates(const Plan& plan, uint64_t samples) {
   return available;
 }
 
-std::vector<std::string> CombineChoice::wanted() const {
-  return combine == "none" ? std::vector<std::string>{} : splitList(combine);
+std::string CombineChoice::text() const { return methods.empty() ? "none" : joinList(methods); }
+
+std::vector<std::string> CombineChoice::names() const {
+  std::vector<std::string> all = methods;
+  all.insert(all.end(), denoisers.begin(), denoisers.end());
+  all.insert(all.end(), bases.begin(), bases.end());
+  if (!biased.empty()) all.push_back(biased);
+  return all;
+}
+
+std::vector<std::string> parseMethods(const std::string& text) {
+  return text == "none" ? std::vector<std::string>{} : splitList(text);
 }
 
 PipelineOptions CombineChoice::options(const std::atomic<bool>* cancel) const {
   PipelineOptions o;
   o.roles.biased = biased;
-  o.roles.bases = splitList(bases);
-  o.roles.denoisers = splitList(denoisers);
+  o.roles.bases = bases;
+  o.roles.denoisers = denoisers;
   o.cancel = cancel;
   const std::vector<OptionInfo> infos = allMethodOptions();
   for (size_t i = 0; i < numbers.size() && i < infos.size(); ++i)
@@ -80,15 +91,13 @@ PipelineOptions CombineChoice::options(const std::atomic<bool>* cancel) const {
 }
 
 void addCombineOptions(CLI::App& command, CombineChoice& c) {
-  command
-      .add_option("--denoiser", c.denoisers, "Denoisers to run and keep, separated by commas, the preferred one first")
-      ->type_name("NAMES");
+  addList(command, "--denoiser", c.denoisers,
+          "Denoisers to run and keep, separated by commas, the preferred one first");
   command
       .add_option("--biased", c.biased,
                   "Biased input of combiners: an estimate, a denoiser or another combiner (--list)")
       ->type_name("NAME");
-  command.add_option("--bases", c.bases, "Images that ensembles choose from, by name, separated by commas")
-      ->type_name("NAMES");
+  addList(command, "--bases", c.bases, "Images that ensembles choose from, by name, separated by commas");
   command.add_flag("--weights", c.weights, "Also write the maps of weights that combiners worked out");
   const std::vector<OptionInfo> infos = allMethodOptions();
   c.numbers.assign(infos.size(), std::numeric_limits<double>::quiet_NaN());
@@ -98,11 +107,11 @@ void addCombineOptions(CLI::App& command, CombineChoice& c) {
             "--" + infos[i].name, [&c, i](const double& value) { c.numbers[i] = value; },
             fmt::format("{} (default {})", infos[i].description, infos[i].fallback))
         ->check(numberOf(infos[i]))
-        ->group("Options of methods");
+        ->group(kMethodOptions);
 }
 
 void combineByDefault(CombineChoice& choice) {
-  choice.combine = kDefaultMethod;
+  choice.methods = {kDefaultMethod};
   choice.asked = false;
 }
 
@@ -110,24 +119,13 @@ void noteWhoAsked(const CLI::App& command, CombineChoice& choice) {
   choice.asked = command.get_option("--combine")->count() > 0;
 }
 
-std::string methodList() {
-  std::string text;
-  for (const auto& [kind, title] :
-       {std::pair(MethodKind::Denoiser, "Denoisers"), {MethodKind::Combiner, "Combiners"}}) {
-    text += fmt::format("{}:\n", title);
-    for (const auto& m : makeMethods())
-      if (m->kind() == kind) text += fmt::format("  {:<18} {}\n", m->name(), m->description());
-  }
-  return text;
-}
-
 CombinePlan planCombining(const CombineChoice& choice, uint64_t samples, Plan& plan) {
-  if (choice.wanted().empty() && choice.denoisers.empty()) return {};
+  if (choice.methods.empty() && choice.denoisers.empty()) return {};
   // By what could be kept, what has to be: quarters and history are of no use elsewhere.
   AvailableEstimates available;
   available.features = true;
   for (const PlannedIntegrator& p : plan.integrators) available.estimates.push_back(plannedEstimate(p, samples));
-  CombinePlan combinePlan = makeCombinePlan(available, choice.wanted(), choice.options().roles);
+  CombinePlan combinePlan = makeCombinePlan(available, choice.methods, choice.options().roles);
   keepAlso(buffersOf(combinePlan), plan);
   return combinePlan;
 }
@@ -150,9 +148,9 @@ std::string combinePlanText(const CombinePlan& combinePlan) {
 
 PipelineResult runCombining(const Estimates& estimates, const CombineChoice& choice, const PipelineOptions& options,
                             int threads) {
-  if (choice.wanted().empty() && choice.denoisers.empty()) return {};
+  if (choice.methods.empty() && choice.denoisers.empty()) return {};
   PipelineResult result;
-  withThreads(threads, [&] { result = runPipeline(estimates, choice.wanted(), options); });
+  withThreads(threads, [&] { result = runPipeline(estimates, choice.methods, options); });
   return result;
 }
 

@@ -22,16 +22,23 @@ namespace braid {
 inline constexpr const char* kDefaultMethod = "auto";
 
 struct CombineChoice {
-  std::string combine = "none";  // or names separated by commas; the last one is the headline
-  bool asked = true;             // by the user: what is a default only is left out where it cannot run
-  std::string denoisers, biased, bases;
+  std::vector<std::string> methods;  // of --combine, the last one is the headline; none: nothing is combined
+  bool asked = true;                 // by the user: what is a default only is left out where it cannot run
+  std::vector<std::string> denoisers, bases;
+  std::string biased;
   bool weights = false;  // also write the maps of weights
   // Values of method options, in the order of allMethodOptions(); not a number: the default.
   std::vector<double> numbers;
 
-  std::vector<std::string> wanted() const;
+  // All names of methods in it.
+  std::vector<std::string> names() const;
+  // --combine as it was given.
+  std::string text() const;
   PipelineOptions options(const std::atomic<bool>* cancel = nullptr) const;
 };
+
+// The names between commas, or nothing for "none".
+std::vector<std::string> parseMethods(const std::string& text);
 
 // --denoiser, --biased, --bases, --weights and the options of every registered method.
 void addCombineOptions(CLI::App& command, CombineChoice& choice);
@@ -39,9 +46,6 @@ void addCombineOptions(CLI::App& command, CombineChoice& choice);
 void combineByDefault(CombineChoice& choice);
 // After parsing: whether the user named what to combine.
 void noteWhoAsked(const CLI::App& command, CombineChoice& choice);
-// One line a method for the help of commands.
-std::string methodList();
-
 // The steps that will run after a render of so many samples (0: not known); the plan gets what the steps need to be
 // kept: quarters, features, history, images for the stop of denoising. Throws Error(Usage) for unknown names.
 CombinePlan planCombining(const CombineChoice& choice, uint64_t samples, Plan& plan);

@@ -71,14 +71,14 @@ void FileUses::scene(const std::string& file, const std::string& environment) {
   scenes_.push_back({"a file of the scene", file});
 }
 
-void FileUses::methods(const std::string& names) {
+void FileUses::method(const std::string& name) {
   const std::string kind = "external:";
-  for (size_t at = names.find(kind); at != std::string::npos; at = names.find(kind, at)) {
+  for (size_t at = name.find(kind); at != std::string::npos; at = name.find(kind, at)) {
     at += kind.size();
-    const size_t end = std::min(names.find_first_of(",@", at), names.size());
+    const size_t end = std::min(name.find('@', at), name.size());
     while (at < end) {
-      const size_t next = std::min(names.find_first_of(":+", at), end);
-      input("an image of " + kind, names.substr(at, next - at));
+      const size_t next = std::min(name.find_first_of(":+", at), end);
+      input("an image of " + kind, name.substr(at, next - at));
       at = next + 1;
     }
     at = end;

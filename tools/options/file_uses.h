@@ -14,8 +14,8 @@ class FileUses {
   void input(const std::string& what, const std::string& path);
   // The scene with the files that it names, and its environment if there is one.
   void scene(const std::string& file, const std::string& environment);
-  // The files that names of methods read: external:FILE, also within bases and after '@'.
-  void methods(const std::string& names);
+  // The files that a method's name reads: external:FILE, also within bases and after '@'.
+  void method(const std::string& name);
 
   // Throws Error(Usage) naming both, where an output is an input or another output: by device and inode, through links,
   // or, for files that do not exist yet, by their paths.

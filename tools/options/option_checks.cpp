@@ -6,6 +6,7 @@
 #include <limits>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "renderer/core/error.h"
 #include "tools/options/option_texts.h"
@@ -73,13 +74,13 @@ std::string complaint(const std::function<void(const std::string&)>& parser, con
   return "";
 }
 
-CLI::Validator duration(bool orZero) {
-  return readBy([orZero](const std::string& text) {
-    if (!orZero && !(parseDuration(text) > 0))
-      throw Error(ExitCode::Usage,
-                  fmt::format("'{}': expected a duration above 0, such as 90, 90s, 2m or 1h30m", text));
-    parseDuration(text);
-  });
+void throwUnknown(const std::string& what, const std::string& name, const std::vector<std::string>& known) {
+  throw Error(ExitCode::Usage, fmt::format("unknown {} '{}': known are {}", what, name, fmt::join(known, ", ")));
+}
+
+CLI::Option* addList(CLI::App& command, const std::string& names, std::vector<std::string>& value,
+                     const std::string& description) {
+  return addWords(command, names, value, splitList, description)->default_str(joinList(value))->type_name("NAMES");
 }
 
 CLI::Option* addThreads(CLI::App& command, int& threads) {

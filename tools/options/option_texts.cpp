@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "renderer/core/error.h"
 
@@ -48,6 +49,8 @@ std::vector<std::string> splitList(const std::string& text) {
   return list;
 }
 
+std::string joinList(const std::vector<std::string>& items) { return fmt::format("{}", fmt::join(items, ",")); }
+
 double parseDuration(const std::string& text) {
   double total = 0;
   const char *at = text.data(), *end = at + text.size();
@@ -73,13 +76,31 @@ std::vector<double> parseNumbers(const std::string& text, size_t count, double l
   return numbers;
 }
 
-std::pair<int, int> parseSize(const std::string& text) {
+double parseLimit(const std::string& text) {
+  const double seconds = parseDuration(text);
+  if (!(seconds > 0)) refuseText(text, "a duration above 0, such as 90, 90s, 2m or 1h30m");
+  return seconds;
+}
+
+FrameSize parseSize(const std::string& text) {
   std::vector<int> size;
   const bool valid = readNumbers(text, "x", size) && size[0] > 0 && size[1] > 0 && size[0] <= kMostPixelsASide &&
                      size[1] <= kMostPixelsASide && int64_t(size[0]) * size[1] <= (int64_t(1) << 28);
   if (!valid)
     refuseText(text, "WIDTHxHEIGHT such as 1280x720, from 1 to 65536 pixels a side and at most 268435456 in all");
   return {size[0], size[1]};
+}
+
+std::string toString(const FrameSize& size) { return fmt::format("{}x{}", size.width, size.height); }
+
+LookAt parseLookAt(const std::string& text) {
+  const std::vector<double> n = parseNumbers(text, 6, -1e15, 1e15);
+  return {{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
+}
+
+Spectrum parseBackground(const std::string& text) {
+  const std::vector<double> n = parseNumbers(text, 3, 0, 1e20);  // what floats hold with room to spare
+  return Spectrum(n[0], n[1], n[2]);
 }
 
 PixelWindow parseWindow(const std::string& text) {

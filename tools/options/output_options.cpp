@@ -6,12 +6,21 @@
 #include <filesystem>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "renderer/core/error.h"
 #include "renderer/film/files/output_file.h"
 
 namespace braid {
+
+CLI::Option* addOutput(CLI::App& command, std::string& file) {
+  return command
+      .add_option("-o,--output", file,
+                  "Image to write, by its ending: .exr with layers; .png, .jpg tone-mapped; .hdr, .tif linear; - is "
+                  "EXR to standard output")
+      ->type_name("FILE");
+}
 
 AovSet parseAovs(const std::string& name) {
   if (name == "none") return AovSet::None;

@@ -6,7 +6,15 @@
 
 #include "renderer/film/files/exr.h"
 
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
 namespace braid {
+
+// -o,--output: an image in the format of its ending.
+CLI::Option* addOutput(CLI::App& command, std::string& file);
 
 // none, features or all. Throws Error(Usage).
 AovSet parseAovs(const std::string& name);

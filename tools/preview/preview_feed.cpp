@@ -18,7 +18,7 @@ uint64_t samplesOf(const Estimates& e) { return e.estimates.front().passes; }
 
 PreviewFeed::PreviewFeed(CombineChoice combine, const Session& session, int threads, Show show, Warn warn)
     : choice_(std::move(combine)),
-      combines_(!choice_.wanted().empty()),
+      combines_(!choice_.methods.empty()),
       session_(session),
       show_(std::move(show)),
       warn_(std::move(warn)) {
@@ -69,7 +69,7 @@ void PreviewFeed::combine(const Snapshot& snapshot, double seconds) {
     const PipelineResult result = runCombining(*snapshot, choice_, choice_.options(&cancel_), helpers_);
     combineTook_ = clock.seconds();
     if (cancel_) return;
-    showImages(*snapshot, result, choice_.wanted(), [&](ImageViews v) {
+    showImages(*snapshot, result, choice_.methods, [&](ImageViews v) {
       // By now there are newer noisy ones.
       v.noisy = nullptr;
       v.noisyError = nullptr;

@@ -37,7 +37,7 @@ bool mayBeTooLate(const PixelWindow& window, int threads, const TimeLimit& limit
 
 ImageOutput withoutStatistics(const ImageOutput& output) {
   ImageOutput plain = output.plain();
-  plain.aovs = output.aovSet() == AovSet::None ? "none" : "features";
+  plain.aovs = output.aovSet() == AovSet::None ? AovSet::None : AovSet::Features;
   plain.quarters = plain.history = plain.directIndirect = false;
   return plain;
 }
@@ -60,7 +60,7 @@ WrittenImage writeCoarse(const CoarseRender& coarse, const Plan& plan, const Ima
   size.text = fmt::format("{}x{}", state.fullWidth, state.fullHeight);
   estimates.attributes.push_back(std::move(size));
   WrittenImage written = writeImage(withoutStatistics(output), estimates, alpha ? &*alpha : nullptr, threads);
-  const bool combines = !output.combine.wanted().empty() || !output.combine.denoisers.empty();
+  const bool combines = !output.combine.methods.empty() || !output.combine.denoisers.empty();
   written.warnings.insert(written.warnings.begin(), lateText(limit, plan, state, combines));
   return written;
 }

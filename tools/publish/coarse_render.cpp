@@ -63,8 +63,8 @@ Plan coarsePlan(const Plan& plan, const CameraData& camera, int divisor) {
   coarse.window = coarseWindow(plan.window, plan.settings, s);
   s.crop = coarse.window;
   if (s.photons > 0) s.photons = std::max<uint64_t>(1, s.photons / static_cast<uint64_t>(divisor * divisor));
-  s.quarters = s.history = s.directIndirect = s.full = false;
-  s.stops.clear();
+  s.keep = {.features = s.keep.features};
+  s.full = false;
   keepAlso({}, coarse);
   return coarse;
 }

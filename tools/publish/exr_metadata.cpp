@@ -6,6 +6,7 @@
 #include "renderer/core/hash.h"
 #include "renderer/session/integrator.h"
 #include "renderer/session/pixel_filter.h"
+#include "renderer/session/rendering_revision.h"
 #include "tools/images/estimates_file.h"
 #include "version.h"
 
@@ -63,6 +64,7 @@ std::vector<Attribute> planAttributes(const Scene& scene, const Plan& plan, cons
   std::vector<Attribute> list{
       text("Software", std::string("braid ") + BRAID_VERSION),
       text("braid/version", BRAID_VERSION),
+      integer("braid/renderingRevision", static_cast<uint64_t>(kRenderingRevision)),
       text("braid/build", BRAID_BUILD_FLAGS),
       text("braid/isa", isa),
       text("braid/scene", scene.data().file),

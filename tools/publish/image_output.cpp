@@ -15,6 +15,7 @@
 #include "renderer/film/files/output_file.h"
 #include "renderer/film/files/picture.h"
 #include "tools/publish/exr_metadata.h"
+#include "tools/options/help.h"
 #include "tools/options/option_checks.h"
 #include "tools/options/output_options.h"
 #include "tools/run/progress_line.h"
@@ -77,7 +78,7 @@ std::vector<std::string> ImageOutput::files() const {
 }
 
 AovSet ImageOutput::aovSet() const {
-  if (!aovs.empty()) return parseAovs(aovs);
+  if (aovs) return *aovs;
   const bool more = quarters || history || directIndirect || combine.weights || !combine.denoisers.empty();
   return more ? AovSet::All : AovSet::Features;
 }
@@ -96,7 +97,7 @@ ImageOutput ImageOutput::replaceable() const {
 
 ImageOutput ImageOutput::plain() const {
   ImageOutput output = *this;
-  output.combine.combine = "none";
+  output.combine.methods.clear();
   output.combine.denoisers.clear();
   return output;
 }
@@ -123,29 +124,20 @@ std::string writeImageFile(const std::string& path, const Estimates& estimates, 
 }
 
 void addImageOptions(CLI::App& command, ImageOutput& o) {
-  command
-      .add_option("--combine", o.combine.combine,
-                  "none, or denoisers and combiners separated by commas (--list); the last one is the image R G B")
-      ->capture_default_str()
-      ->type_name("NAMES");
-  addCombineOptions(command, o.combine);
-  command
-      .add_option("-o,--output", o.file,
-                  "Image to write, by its ending: .exr with layers; .png, .jpg tone-mapped; .hdr, .tif linear; "
-                  "- is EXR to standard output")
-      ->type_name("FILE");
+  addOutput(command, o.file);
   command.add_option("--png", o.png, "Also write a tone-mapped PNG")->type_name("FILE");
   command.add_option("--exposure", o.exposure, "Exposure of PNG and JPEG in stops")
       ->capture_default_str()
       ->check(number(-64, 64));
-  command
-      .add_option(
-          "--aovs", o.aovs,
-          fmt::format("Layers of the EXR besides the image: none; features, with the image's error; or all, "
-                      "which combining the file later takes (default: {})",
-                      o.aovs.empty() ? "features; all with --quarters, --direct-indirect, --history, --weights or "
-                                       "--denoiser"
-                                     : o.aovs))
+  addWords(command, "--combine", o.combine.methods, parseMethods,
+           "none, or methods of --list; the last one makes the image")
+      ->default_str(o.combine.text())
+      ->type_name("NAMES");
+  addCombineOptions(command, o.combine);
+  addWords(command, "--aovs", o.aovs, parseAovs,
+           fmt::format("Layers of the EXR besides the image: none; features, with the image's error; or all, which "
+                       "combining the file later takes (default: {})",
+                       o.aovs ? nameOf(*o.aovs) : "features, or all where another option asks for more"))
       ->type_name("SET");
   command.add_flag("--quarters", o.quarters, "Also write the four quarter buffers");
   command.add_flag("--direct-indirect", o.directIndirect,
@@ -155,6 +147,7 @@ void addImageOptions(CLI::App& command, ImageOutput& o) {
   command.add_option("--layer-prefix", o.layerPrefix, "Put before every layer's name, e.g. ViewLayer")
       ->type_name("NAME");
   command.add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
+  showFirst(command, kOutputHelp, {"--output", "--png", "--exposure", "--combine", "--aovs"});
 }
 
 void showImages(const Estimates& estimates, const PipelineResult& combined, const std::vector<std::string>& wanted,
@@ -182,7 +175,7 @@ void showImages(const Estimates& estimates, const PipelineResult& combined, cons
 WrittenImage writeImage(const ImageOutput& o, Estimates& estimates, const Plane<float>* alpha, int threads,
                         const std::atomic<bool>* cancel) {
   WrittenImage written;
-  const std::vector<std::string> wanted = o.combine.wanted();
+  const std::vector<std::string> wanted = o.combine.methods;
   const Stopwatch combining;
   const PipelineResult combined = runCombining(estimates, o.combine, o.combine.options(cancel), threads);
   written.combineSeconds = combining.seconds();

@@ -31,8 +31,9 @@ struct ImageViews {
 using ShowImages = std::function<void(const ImageViews&)>;
 
 struct ImageOutput {
-  std::string file, png;  // empty: not written; the ending says the format of `file`
-  std::string aovs, layerPrefix;
+  std::string file, png;       // empty: not written; the ending says the format of `file`
+  std::optional<AovSet> aovs;  // none: see aovSet()
+  std::string layerPrefix;
   double exposure = 0;
   bool quarters = false, history = false, directIndirect = false, floatHeadline = false, noTiming = false;
   CombineChoice combine;
@@ -40,8 +41,7 @@ struct ImageOutput {
 
   // The names of the files, without empty ones.
   std::vector<std::string> files() const;
-  // What --aovs says; nothing said: features, or all where layers that are there only then have been asked for. Throws
-  // Error(Usage).
+  // What --aovs says; nothing said: features, or all where layers that are there only then have been asked for.
   AovSet aovSet() const;
   // What the film has to keep for the layers.
   KeptBuffers buffers() const;

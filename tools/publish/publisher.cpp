@@ -76,7 +76,7 @@ bool BackgroundJob::collectLast(std::exception_ptr& failure) {
 
 Publisher::Publisher(PublishOptions options, Session& session)
     : options_(std::move(options)),
-      combines_(!options_.image.combine.wanted().empty() || !options_.image.combine.denoisers.empty()),
+      combines_(!options_.image.combine.methods.empty() || !options_.image.combine.denoisers.empty()),
       session_(session),
       schedule_(options_.saveEvery, options_.targetError, combines_,
                 expectedCosts(session.plan().window, options_.image, options_.threads)),
@@ -155,7 +155,7 @@ void Publisher::publishImage(const Progress& p, bool combined, int threads) {
 }
 
 void Publisher::look(const Progress& p, std::vector<Publication>& news) {
-  // Where the last image would not be done in time, it tells the error.
+  // Where no time is left for a look, the last image ends the run, and has its error.
   if (options_.limit.left() < lastCost(combines_)) return;
   cancel_ = true;  // what is at work makes way
   collect(news, true);
@@ -165,7 +165,7 @@ void Publisher::look(const Progress& p, std::vector<Publication>& news) {
   collect(news, true);
   const std::optional<double>& error = pending_.image.error;
   const bool written = !pending_.image.cancelled && pending_.image.writeSeconds > 0;
-  // An error that is never told would never end the run.
+  // Where no error is ever estimated, nothing else would end an endless run.
   if (!written || (error ? *error > options_.targetError : !options_.endless)) return;
   reached_ = true;
   last_ = pending_.image;
@@ -190,7 +190,7 @@ void Publisher::giveUpIfTooLong(const Progress& p) {
 std::vector<Publication> Publisher::round(const Progress& p) {
   std::vector<Publication> news;
   collect(news);
-  // Combining tells two samples from each other, at least: after the first round there has to be time for another.
+  // Combining needs two samples at least: after the first round there has to be time for another.
   if (combines_ && (p.round == 1 || !combinesLast_))
     combinesLast_ =
         options_.limit.left() - p.seconds / static_cast<double>(std::max<uint64_t>(1, p.round)) >= lastCost(true);

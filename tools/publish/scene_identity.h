@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "renderer/film/film_state.h"
-#include "tools/options/cli.h"
+#include "tools/options/scene_options.h"
 
 namespace braid {
 

@@ -240,8 +240,8 @@ class TevClient::Sender {
   std::map<std::string, Sent> sent_;
 };
 
-TevClient::TevClient(const std::string& address) : mailbox_(std::make_shared<Mailbox>()) {
-  thread_ = std::thread([box = mailbox_, to = parseTevAddress(address)] { Sender(box, to.host, to.port).run(); });
+TevClient::TevClient(const TevAddress& address) : mailbox_(std::make_shared<Mailbox>()) {
+  thread_ = std::thread([box = mailbox_, to = address] { Sender(box, to.host, to.port).run(); });
 }
 
 TevClient::~TevClient() {

@@ -15,13 +15,12 @@ namespace braid {
 struct TevAddress {
   std::string host, port = "14158";
 };
-// Throws Error(Usage).
+// HOST:PORT, or HOST for tev's own port. Throws Error(Usage).
 TevAddress parseTevAddress(const std::string& text);
 
 class TevClient {
  public:
-  // `address` is HOST:PORT or HOST, for tev's own port 14158. Throws Error(Usage) if it is neither.
-  explicit TevClient(const std::string& address);
+  explicit TevClient(const TevAddress& address);
   // The newest images still go out if the viewer takes them within kGrace seconds.
   ~TevClient();
   TevClient(const TevClient&) = delete;

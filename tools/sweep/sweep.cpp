@@ -3,48 +3,26 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <functional>
 #include <map>
-#include <tuple>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "integrators/registry.h"
 #include "renderer/core/error.h"
-#include "renderer/film/files/exr.h"
 #include "renderer/images/image_codecs.h"
-#include "tools/options/cli.h"
-#include "tools/options/file_uses.h"
+#include "tools/options/open_scene.h"
 #include "tools/run/interrupt.h"
+#include "tools/sweep/sweep_folder.h"
+#include "tools/sweep/sweep_inputs.h"
 #include "tools/sweep/sweep_pipeline.h"
 #include "tools/sweep/sweep_progress.h"
-#include "tools/sweep/sweep_record.h"
-#include "tools/sweep/report/sweep_report.h"
 #include "tools/sweep/sweep_run.h"
-#include "version.h"
+#include "tools/sweep/table/sweep_summary.h"
 
 namespace braid {
 
 namespace {
-
-using Json = nlohmann::ordered_json;
-namespace fs = std::filesystem;
-
-void makeFolder(const std::string& path) {
-  std::error_code failure;
-  fs::create_directories(path, failure);
-  if (failure) throw Error(ExitCode::OutputFailed, fmt::format("{}: cannot be created: {}", path, failure.message()));
-}
-
-// Whether the method or an input of it is the fixed image of a file: external:FILE.
-bool readsFile(const std::string& method) {
-  const std::string name = "external:";
-  for (size_t at = method.find(name); at != std::string::npos; at = method.find(name, at + 1))
-    if (at == 0 || std::string("@+/").find(method[at - 1]) != std::string::npos) return true;
-  return false;
-}
 
 // The methods of a scene for which the plan keeps these integrators, joined by '+'.
 using MethodsOf = std::function<std::vector<SweepMethod>(const std::string& planned)>;
@@ -60,28 +38,21 @@ class Sweep {
     std::vector<double> rungs;
   };
 
-  void checkInputs() const;
-  void checkOutputs() const;
-  void openFolder();
   std::vector<SweepJob> jobsOf(const std::string& scene) const;
   void expectWork();
   // False when interrupted.
   bool runScene(size_t index);
-  std::string plannedIntegrators(const SweepScene& scene) const;
   bool findReference(SweepScene& scene);
   bool renderReference(SweepScene& scene, const std::string& integrator);
   void warmUp(const SweepScene& scene, const SweepJob& job) const;
   bool runJob(const SweepScene& scene, const SweepJob& job);
-  void keepRow(const SweepRow& row, const Rgb<float>& image);
-  void recordScene(const SweepScene& scene);
+  SweepCallbacks callbacksOf(const SweepScene& scene, const SweepJob& job);
   void warnAboutReference(const SweepScene& scene);
-  void sortRows();
-  void finish(std::ostream& out);
   void warn(const std::string& text);
   // Says which cells failed and which methods never ran; whether there were any.
   bool reportFailures() const;
 
-  std::string path(const char* name) const { return o_.output + "/" + name; }
+  SceneChoice choiceOf(const std::string& file) const;
 
   const SweepOptions& o_;
   MethodsOf methodsOf_;
@@ -91,8 +62,7 @@ class Sweep {
   std::vector<LadderRungs> ladders_;
   Settings settings_;
   Measurement measurement_;
-  SweepTable table_;
-  Json record_;
+  SweepFolder folder_;
   SweepProgress progress_;
   std::vector<std::string> failures_;               // a line for each cell that was tried and failed
   std::map<std::string, std::string> skipReasons_;  // by method, the last one
@@ -105,103 +75,28 @@ Sweep::Sweep(const SweepOptions& options, MethodsOf methods, const std::vector<c
       methods_(methodsOf_("pt")),
       integrators_(integrators),
       names_(sceneNames(options.scenes)),
+      folder_(options, measurement_, [this](const std::string& text) { warn(text); }),
       progress_(options.quiet),
       interrupted_(installInterruptHandler()) {
-  SceneChoice scene;
-  scene.size = o_.size;
   SampleChoice samples;
   samples.sampler = o_.sampler;
   samples.maxDepth = o_.maxDepth;
   samples.threads = o_.threads;
-  settings_ = makeSettings(scene, samples);
+  settings_ = makeSettings(choiceOf(""), samples);
   measurement_.metrics = chooseMetrics(o_.metrics);
   measurement_.cropWorst = o_.cropWorst;
-  const std::string spp = o_.spp.empty() && o_.time.empty() ? "4:256" : o_.spp;
-  if (!spp.empty()) ladders_.push_back({Ladder::Samples, parseLadder(spp, false)});
-  if (!o_.time.empty()) ladders_.push_back({Ladder::Time, parseLadder(o_.time, true)});
+  const std::vector<double> usual = o_.time.empty() ? parseLadder("4:256", false) : std::vector<double>{};
+  if (const auto& rungs = o_.spp.empty() ? usual : o_.spp; !rungs.empty()) ladders_.push_back({Ladder::Samples, rungs});
+  if (!o_.time.empty()) ladders_.push_back({Ladder::Time, o_.time});
 }
 
-// Everything that can be known to fail hours later is found before the first render.
-void Sweep::checkInputs() const {
-  if (o_.seeds < 1) throw Error(ExitCode::Usage, "--seeds: at least 1");
-  if (o_.seed >= kReferenceSeed - static_cast<uint64_t>(o_.seeds))
-    throw Error(ExitCode::Usage, "--seed: below 2^63; references use the seeds from there on");
-  if (!(o_.cropWorst >= 0 && o_.cropWorst < 1))
-    throw Error(ExitCode::Usage, "--crop-worst: a fraction of the pixels, from 0 to below 1");
-  size_t rungs = 0;
-  for (const LadderRungs& l : ladders_) rungs += l.rungs.size();
-  for (const SweepMethod& method : methods_)
-    if (readsFile(method.name) && (rungs > 1 || o_.scenes.size() > 1))
-      throw Error(
-          ExitCode::Usage,
-          fmt::format("--methods: {}: one image cannot stand for {}: it would be compared everywhere as if it had "
-                      "been made there; give one scene and one rung, or external-command:'COMMAND {{color}} "
-                      "{{albedo}} {{normal}} {{out}}'",
-                      method.name,
-                      rungs > 1 ? fmt::format("{} rungs", rungs) : fmt::format("{} scenes", o_.scenes.size())));
-  for (const std::string& file : o_.scenes)
-    if (!fs::exists(file)) throw Error(ExitCode::BadInput, file + ": no such file");
-  for (const auto* list : {&o_.references, &o_.referenceIntegrators})
-    for (const std::string& item : *list) {
-      const std::string scene = item.substr(0, item.find('='));
-      if (item.find('=') != std::string::npos && std::find(names_.begin(), names_.end(), scene) == names_.end())
-        throw Error(ExitCode::Usage, fmt::format("'{}': no scene of the sweep is called {}", item, scene));
-    }
-  for (const std::string& name : names_) {
-    const std::string file = valueForScene(o_.references, name, ""),
-                      integrator = valueForScene(o_.referenceIntegrators, name, "pt");
-    if (!file.empty() && !fs::exists(file)) throw Error(ExitCode::BadInput, file + ": no such reference");
-    const bool known =
-        integrator == "auto" || std::any_of(integrators_.begin(), integrators_.end(),
-                                            [&](const Integrator* i) { return i->name() == integrator; });
-    if (!known) throw Error(ExitCode::Usage, fmt::format("--reference-integrator: no integrator '{}'", integrator));
-  }
-}
-
-// What the sweep writes takes the place of no scene and no reference.
-void Sweep::checkOutputs() const {
-  FileUses uses;
-  for (const char* name : {"sweep.csv", "sweep.json", "summary.md", "report.html"}) uses.output("-o", path(name));
-  std::vector<std::string> inputs = o_.scenes;
-  for (const std::string& file : o_.scenes) uses.scene(file, "");
-  for (const std::string& name : names_)
-    if (const std::string file = valueForScene(o_.references, name, ""); !file.empty()) {
-      uses.input("a reference", file);
-      inputs.push_back(file);
-    }
-  uses.check();
-  for (const std::string& file : inputs)
-    for (const char* folder : {"images", "plots"})
-      if (isWithin(file, path(folder)))
-        throw Error(ExitCode::Usage,
-                    fmt::format("-o {}: the sweep writes into {}, where its input {} lies: choose another folder",
-                                o_.output, path(folder), file));
-}
-
-void Sweep::openFolder() {
-  for (const char* folder : {"", "/references", "/images", "/plots"}) makeFolder(o_.output + folder);
-  const Json settings = sweepSettings(o_, settings_, measurement_);
-  record_ = {{"schema", 1}, {"scenes", Json::array()}};
-  if (fs::exists(path("sweep.csv"))) table_ = readSweepTable(path("sweep.csv"));
-  // A run that ended before its first row binds nobody.
-  if (!table_.rows.empty()) {
-    record_ = readRecord(path("sweep.json"));
-    requireSameSettings(path("sweep.json"), record_["settings"], settings);
-    const Json machine = machineRecord();
-    if (record_["machine"] != machine) warn("the rows of this folder were measured on another machine: times differ");
-    if (table_.columns != measurement_.columns())
-      throw Error(ExitCode::Usage, path("sweep.csv") + ": has other columns; choose another folder (-o)");
-  }
-  table_.columns = measurement_.columns();
-  record_["braid"] = {{"version", BRAID_VERSION}, {"build", BRAID_BUILD_FLAGS}};
-  record_["machine"] = machineRecord();
-  record_["settings"] = settings;
-  Json methods = Json::array();
-  for (const SweepMethod& m : methods_) methods.push_back(m.name);
-  record_["run"] = {{"methods", methods}, {"spp", o_.spp},   {"time", o_.time},
-                    {"seeds", o_.seeds},  {"seed", o_.seed}, {"referenceSpp", o_.referenceSpp}};
-  writeText(path("sweep.json"), record_.dump(2) + "\n");
-  writeSweepTable(path("sweep.csv"), table_);
+SceneChoice Sweep::choiceOf(const std::string& file) const {
+  SceneChoice choice;
+  choice.file = file;
+  choice.isa = o_.isa;
+  choice.quiet = o_.quiet;
+  choice.size = o_.size;  // of its shape depends what the camera sees
+  return choice;
 }
 
 std::vector<SweepJob> Sweep::jobsOf(const std::string& scene) const {
@@ -222,7 +117,7 @@ std::vector<SweepJob> Sweep::jobsOf(const std::string& scene) const {
           cell.method = method.name;
           for (double rung : l.rungs) {
             cell.mark = rung;
-            if (!table_.has(cell)) job.cells.push_back({&method, rung});
+            if (!folder_.table().has(cell)) job.cells.push_back({&method, rung});
           }
         }
         if (!job.cells.empty()) jobs.push_back(std::move(job));
@@ -249,7 +144,7 @@ bool Sweep::renderReference(SweepScene& scene, const std::string& integrator) {
   progress_.expect(total, 0);
   progress_.begin(scene.name + " reference", total, 0);
   std::optional<SweepReference> reference = braid::renderReference(
-      path("references"), *scene.scene, scene.camera, settings, integrators_,
+      folder_.path("references"), {*scene.scene, scene.camera, settings, integrators_},
       [&](const Progress& p) {
         progress_.update(static_cast<double>(p.round), 0, fmt::format("{}/{} spp", p.round, p.rounds));
         return true;
@@ -259,16 +154,6 @@ bool Sweep::renderReference(SweepScene& scene, const std::string& integrator) {
   if (!reference) return false;
   scene.reference = std::move(*reference);
   return true;
-}
-
-std::string Sweep::plannedIntegrators(const SweepScene& scene) const {
-  Settings settings = settings_;
-  settings.integrators = {"auto"};
-  settings.spp = 64;
-  std::string names;
-  for (const PlannedIntegrator& i : makePlan(*scene.scene, scene.camera, settings, integrators_).integrators)
-    names += (names.empty() ? "" : "+") + std::string(i.integrator->name());
-  return names;
 }
 
 bool Sweep::findReference(SweepScene& scene) {
@@ -284,10 +169,12 @@ bool Sweep::findReference(SweepScene& scene) {
                        scene.name, r.integrator, file, r.passedOver));
     return true;
   }
-  if (auto kept = keptReference(path("references"), frame, integrator, o_.referenceSpp)) {
+  std::string stale;
+  if (auto kept = keptReference(folder_.path("references"), frame, integrator, o_.referenceSpp, &stale)) {
     scene.reference = std::move(*kept);
     return true;
   }
+  if (!stale.empty()) warn(stale);
   return renderReference(scene, integrator);
 }
 
@@ -303,19 +190,31 @@ void Sweep::warmUp(const SweepScene& scene, const SweepJob& job) const {
   Session(*scene.scene, makePlan(*scene.scene, scene.camera, settings, integrators_)).run({}, &interrupted_);
 }
 
-void Sweep::keepRow(const SweepRow& row, const Rgb<float>& image) {
-  const auto l =
-      std::find_if(ladders_.begin(), ladders_.end(), [&](const LadderRungs& x) { return x.ladder == row.ladder; });
-  if (row.mark == l->rungs.back() && !image.empty()) {
-    ExrOptions exr;
-    exr.floatHeadline = true;
-    const std::string path = row.seed == o_.seed
-                                 ? imagePath(o_.output, row.scene, row.method, row.ladder, row.mark)
-                                 : replicatePath(o_.output, row.scene, row.method, row.ladder, row.mark, row.seed);
-    writeExr(path, {}, image, nullptr, exr);
-  }
-  appendSweepRow(path("sweep.csv"), row);
-  table_.rows.push_back(row);
+SweepCallbacks Sweep::callbacksOf(const SweepScene& scene, const SweepJob& job) {
+  const bool samples = job.ladder == Ladder::Samples;
+  SweepCallbacks callbacks;
+  callbacks.cancel = &interrupted_;
+  callbacks.onRow = [this](const SweepRow& row, const Rgb<float>& image) {
+    const auto ladder =
+        std::find_if(ladders_.begin(), ladders_.end(), [&](const LadderRungs& l) { return l.ladder == row.ladder; });
+    folder_.keep(row, image, row.mark == ladder->rungs.back());
+  };
+  callbacks.onSkip = [this, &scene](const SweepMethod& method, const std::string& skipReason) {
+    warn(fmt::format("{}: {} did not run: {}", scene.name, method.name, skipReason));
+    skipReasons_[method.name] = skipReason;
+  };
+  callbacks.onFailure = [this](const SweepRow& row, const std::string& skipReason) {
+    failures_.push_back(fmt::format("{}, {} at {} {}, seed {}: {}", row.scene, row.method, row.mark,
+                                    row.ladder == Ladder::Samples ? "samples" : "seconds", row.seed, skipReason));
+    warn(failures_.back());
+    skipReasons_[row.method] = skipReason;
+  };
+  callbacks.onRound = [this, &job, samples](uint64_t rounds, double done) {
+    const std::string detail = samples ? fmt::format("{}/{} spp", rounds, job.lastMark())
+                                       : fmt::format("{:.1f}/{} s, {} spp", done, job.lastMark(), rounds);
+    progress_.update(samples ? static_cast<double>(rounds) * job.passesPerRound() : 0, samples ? 0 : done, detail);
+  };
+  return callbacks;
 }
 
 bool Sweep::runJob(const SweepScene& scene, const SweepJob& job) {
@@ -324,40 +223,9 @@ bool Sweep::runJob(const SweepScene& scene, const SweepJob& job) {
   std::string who;
   for (const MethodShare& i : job.inputs()) who += (who.empty() ? "" : "+") + i.integrator;
   progress_.begin(fmt::format("{} {} seed {}", scene.name, who, job.seed), passes, seconds);
-  SweepCallbacks callbacks;
-  callbacks.cancel = &interrupted_;
-  callbacks.onRow = [&](const SweepRow& row, const Rgb<float>& image) { keepRow(row, image); };
-  callbacks.onSkip = [&](const SweepMethod& method, const std::string& skipReason) {
-    warn(fmt::format("{}: {} did not run: {}", scene.name, method.name, skipReason));
-    skipReasons_[method.name] = skipReason;
-  };
-  callbacks.onFailure = [&](const SweepRow& row, const std::string& skipReason) {
-    failures_.push_back(fmt::format("{}, {} at {} {}, seed {}: {}", row.scene, row.method, row.mark,
-                                    row.ladder == Ladder::Samples ? "samples" : "seconds", row.seed, skipReason));
-    warn(failures_.back());
-    skipReasons_[row.method] = skipReason;
-  };
-  callbacks.onRound = [&](uint64_t rounds, double done) {
-    const std::string detail = samples ? fmt::format("{}/{} spp", rounds, job.lastMark())
-                                       : fmt::format("{:.1f}/{} s, {} spp", done, job.lastMark(), rounds);
-    progress_.update(samples ? static_cast<double>(rounds) * job.passesPerRound() : 0, samples ? 0 : done, detail);
-  };
-  const bool completed = runSweepJob(scene, settings_, integrators_, measurement_, job, callbacks);
+  const bool completed = runSweepJob(scene, settings_, integrators_, measurement_, job, callbacksOf(scene, job));
   progress_.end();
   return completed && !interrupted_;
-}
-
-void Sweep::recordScene(const SweepScene& scene) {
-  const Json now = sceneRecord(scene, referenceFrame(*scene.scene, scene.camera, settings_));
-  for (Json& before : record_["scenes"])
-    if (before["name"] == scene.name) {
-      requireSameScene(path("sweep.json"), before, now);
-      before = now;
-      writeText(path("sweep.json"), record_.dump(2) + "\n");
-      return;
-    }
-  record_["scenes"].push_back(now);
-  writeText(path("sweep.json"), record_.dump(2) + "\n");
 }
 
 void Sweep::warnAboutReference(const SweepScene& scene) {
@@ -369,9 +237,10 @@ void Sweep::warnAboutReference(const SweepScene& scene) {
     return;
   }
   const double noise = referenceNoise(scene.reference.image);
-  const size_t column = table_.column("relL2_unbiased");
+  const SweepTable& table = folder_.table();
+  const size_t column = table.column("relL2_unbiased");
   double least = INFINITY;
-  for (const SweepRow& r : table_.rows)
+  for (const SweepRow& r : table.rows)
     if (r.scene == scene.name) least = std::min(least, r.values[column]);
   if (std::isfinite(least) && noise > 0.1 * std::max(0.0, least))
     warn(
@@ -381,69 +250,24 @@ void Sweep::warnAboutReference(const SweepScene& scene) {
 }
 
 bool Sweep::runScene(size_t index) {
-  SceneChoice choice;
-  choice.file = o_.scenes[index];
-  choice.isa = o_.isa;
-  choice.quiet = o_.quiet;
-  choice.size = o_.size;  // of its shape depends what the camera sees
   SweepScene scene;
   scene.name = names_[index];
-  scene.file = choice.file;
-  LoadTimes times;
-  SceneData data = loadScene(choice, &times);
-  scene.loadSeconds = times.load;
-  scene.camera = chooseCamera(data, choice);
-  scene.scene = buildScene(std::move(data), choice, scene.camera);
-  scene.planned = plannedIntegrators(scene);
+  scene.file = o_.scenes[index];
+  OpenedScene opened = openScene(choiceOf(scene.file));
+  scene.loadSeconds = opened.loadSeconds;
+  scene.camera = opened.camera;
+  scene.scene = std::move(opened.scene);
+  scene.planned = plannedIntegrators(scene, settings_, integrators_);
   methods_ = methodsOf_(scene.planned);
   const std::vector<SweepJob> jobs = jobsOf(scene.name);
   if (!findReference(scene)) return false;
-  recordScene(scene);
+  folder_.record(scene, referenceFrame(*scene.scene, scene.camera, settings_));
   warmUp(scene, jobs.front());
   for (const SweepJob& job : jobs)
     if (!runJob(scene, job)) return false;
   progress_.breakLine();
   warnAboutReference(scene);
   return true;
-}
-
-void Sweep::sortRows() {
-  const auto place = [](const std::vector<std::string>& order, const std::string& name) {
-    return std::find(order.begin(), order.end(), name) - order.begin();
-  };
-  std::vector<std::string> methods;
-  for (const SweepMethod& m : methods_) methods.push_back(m.name);
-  const auto key = [&](const SweepRow& r) {
-    return std::tuple(place(names_, r.scene), r.scene, place(methods, r.method), r.method, r.ladder, r.mark, r.seed);
-  };
-  std::stable_sort(table_.rows.begin(), table_.rows.end(),
-                   [&](const SweepRow& a, const SweepRow& b) { return key(a) < key(b); });
-}
-
-// Rows of earlier runs, of methods and scenes that this one did not ask for, are part of the summary too.
-void Sweep::finish(std::ostream& out) {
-  progress_.breakLine();
-  sortRows();
-  writeSweepTable(path("sweep.csv"), table_);
-  if (table_.rows.empty()) return;
-  std::vector<std::string> scenes, methods;
-  const auto add = [](std::vector<std::string>& list, const std::string& name) {
-    if (std::find(list.begin(), list.end(), name) == list.end()) list.push_back(name);
-  };
-  for (const SweepRow& r : table_.rows) {
-    add(scenes, r.scene);
-    add(methods, r.method);
-  }
-  const SweepSummary summary = summarise(table_, scenes, methods);
-  record_["metrics"] = Json::array();
-  for (const Metric* m : measurement_.metrics)
-    record_["metrics"].push_back(
-        {{"name", m->name}, {"description", m->description}, {"largerIsBetter", m->largerIsBetter}});
-  record_["summary"] = toJson(summary);
-  writeText(path("sweep.json"), record_.dump(2) + "\n");
-  for (const std::string& line : writeSweepReport(o_.output, table_, summary, record_, !o_.noPlots)) warn(line);
-  out << toMarkdown(summary);
-  if (!o_.quiet) fmt::print(stderr, "Saved: {} {} {}\n", path("sweep.csv"), path("summary.md"), path("report.html"));
 }
 
 void Sweep::warn(const std::string& text) {
@@ -457,7 +281,8 @@ bool Sweep::reportFailures() const {
                failures_.size(), failures_.back());
   bool all = true;
   for (const SweepMethod& method : methods_) {
-    const bool ran = std::any_of(table_.rows.begin(), table_.rows.end(), [&](const SweepRow& row) {
+    const std::vector<SweepRow>& rows = folder_.table().rows;
+    const bool ran = std::any_of(rows.begin(), rows.end(), [&](const SweepRow& row) {
       return row.method == method.name && !row.values.empty() && !std::isnan(row.values.front());
     });
     if (ran) continue;
@@ -470,15 +295,20 @@ bool Sweep::reportFailures() const {
 }
 
 int Sweep::run(std::ostream& out) {
-  checkInputs();
-  checkOutputs();
+  size_t rungs = 0;
+  for (const LadderRungs& l : ladders_) rungs += l.rungs.size();
+  checkSweepInputs(o_, names_, methods_, integrators_, rungs);
+  checkSweepOutputs(o_, names_);
   imageCodecs();  // what cannot be written must not be rendered
-  openFolder();
+  folder_.open(settings_, methods_);
   expectWork();
   bool completed = true;
   for (size_t i = 0; i < names_.size() && completed; ++i)
     if (!jobsOf(names_[i]).empty()) completed = runScene(i);
-  finish(out);
+  progress_.breakLine();
+  std::vector<std::string> methods;
+  for (const SweepMethod& m : methods_) methods.push_back(m.name);
+  folder_.finish(names_, methods, out);
   if (completed) return reportFailures() ? static_cast<int>(ExitCode::BadInput) : 0;
   fmt::print(stderr, "interrupted: the same command goes on where it stopped\n");
   return static_cast<int>(ExitCode::Interrupted);

@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "renderer/core/sampler.h"
+#include "tools/options/option_texts.h"
 #include "tools/sweep/sweep_method.h"
 
 namespace braid {
@@ -20,7 +22,7 @@ struct SweepOptions {
   std::vector<std::string> scenes;                      // files
   std::string output;                                   // folder
   std::string preset;                                   // its name, empty: none; already applied
-  std::string spp, time;                                // ladders such as 4:1024 or 1:32; both empty: 4:256 samples
+  std::vector<double> spp, time;                        // rungs of the ladders, rising; both empty: 4:256 samples
   std::vector<std::string> methods{"pt", "auto/auto"};  // what renders make when nothing is said, and the plain image
   int seeds = 1;
   uint64_t seed = 0;  // of the first run; the others follow
@@ -28,7 +30,9 @@ struct SweepOptions {
   // One for all scenes, or SCENE=VALUE with the scene's name (the stem of its file).
   std::vector<std::string> references, referenceIntegrators;
   std::vector<std::string> metrics;  // empty: all
-  std::string size = "640x360", sampler = "sobol", isa = "avx2";
+  FrameSize size{640, 360};
+  SamplerKind sampler = SamplerKind::Sobol;
+  std::string isa = "avx2";
   int maxDepth = 32, threads = 0;
   double cropWorst = 0.001;
   double commandTimeout = 600;  // seconds that one run of an external command may take

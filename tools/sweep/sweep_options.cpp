@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "renderer/core/error.h"
-#include "tools/options/cli.h"
 #include "tools/sweep/sweep.h"
 
 namespace braid {

@@ -11,6 +11,8 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
+#include "renderer/session/rendering_revision.h"
+#include "tools/options/scene_options.h"
 
 namespace braid {
 
@@ -43,9 +45,10 @@ Json finiteOrNull(double v) { return std::isfinite(v) ? Json(v) : Json(); }
 Json sweepSettings(const SweepOptions& options, const Settings& settings, const Measurement& measurement) {
   Json metrics = Json::array();
   for (const Metric* m : measurement.metrics) metrics.push_back(m->name);
-  return {{"size", fmt::format("{}x{}", settings.width, settings.height)},
+  return {{"renderingRevision", kRenderingRevision},
+          {"size", fmt::format("{}x{}", settings.width, settings.height)},
           {"maxDepth", settings.maxDepth},
-          {"sampler", options.sampler},
+          {"sampler", toString(options.sampler)},
           {"threads", options.threads},
           {"isa", options.isa},
           {"cropWorst", options.cropWorst},

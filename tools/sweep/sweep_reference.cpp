@@ -10,8 +10,8 @@
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
 #include "renderer/film/files/exr.h"
+#include "renderer/session/rendering_revision.h"
 #include "tools/publish/exr_metadata.h"
-#include "version.h"
 
 namespace braid {
 
@@ -41,6 +41,14 @@ bool sameMatrix(const Attribute* a, const Mat4& m) {
       if (!(std::fabs(v - m[i][j]) <= 1e-4f * std::max(1.0f, std::fabs(m[i][j])))) return false;
     }
   return true;
+}
+
+// Why a file of braid shows other pixels than this braid would make; empty: it does not.
+std::string staleness(const ImageFile& file) {
+  const Attribute* revision = find(file, "braid/renderingRevision");
+  if (revision && revision->integer == kRenderingRevision) return "";
+  return fmt::format("it was rendered at rendering revision {}, and this braid renders at {}",
+                     revision ? std::to_string(revision->integer) : "0", kRenderingRevision);
 }
 
 // What files of braid say about themselves must agree.
@@ -131,28 +139,35 @@ std::string referenceName(const ReferenceFrame& frame) {
 
 SweepReference readReference(const std::string& path, const ReferenceFrame& frame, const std::string& integrator,
                              uint64_t firstSeed, uint64_t seeds) {
-  return toReference(readChecked(path, frame, firstSeed, seeds), integrator);
+  const ImageFile file = readChecked(path, frame, firstSeed, seeds);
+  if (find(file, "braid/version"))
+    if (const std::string reason = staleness(file); !reason.empty()) refuse(path, reason + "; render it anew");
+  return toReference(file, integrator);
 }
 
 std::optional<SweepReference> keptReference(const std::string& folder, const ReferenceFrame& frame,
-                                            const std::string& integrator, uint64_t spp) {
+                                            const std::string& integrator, uint64_t spp, std::string* stale) {
   const std::string path = folder + "/" + referenceName(frame);
   if (!std::filesystem::exists(path)) return {};
   const ImageFile file = readChecked(path, frame, 0, 0);
-  if (textOf(file, "braid/version") != BRAID_VERSION) return {};
+  if (const std::string reason = staleness(file); !reason.empty()) {
+    if (stale) *stale = fmt::format("{}: {}: the reference is rendered again", path, reason);
+    return {};
+  }
   SweepReference reference = toReference(file, integrator);
   if (reference.integrator != integrator || reference.spp < spp || !reference.image.hasHalves()) return {};
   return reference;
 }
 
-std::optional<SweepReference> renderReference(const std::string& folder, const Scene& scene, const CameraData& camera,
-                                              Settings settings, const std::vector<const Integrator*>& integrators,
+std::optional<SweepReference> renderReference(const std::string& folder, const ReferenceJob& job,
                                               const Session::ProgressCallback& progress,
                                               const std::atomic<bool>* cancel) {
+  const Scene& scene = job.scene;
+  Settings settings = job.settings;
   settings.seed = kReferenceSeed;
   settings.spp += settings.spp % 2;
   settings.keep.features = false;
-  Session session(scene, makePlan(scene, camera, settings, integrators));
+  Session session(scene, makePlan(scene, job.camera, settings, job.integrators));
   const RenderResult result = session.run(progress, cancel);
   if (result.reason == StopReason::Cancelled) return {};
 
@@ -161,7 +176,7 @@ std::optional<SweepReference> renderReference(const std::string& folder, const S
   ExrOptions exr;
   exr.floatHeadline = true;
   SweepReference reference;
-  reference.file = folder + "/" + referenceName(referenceFrame(scene, camera, settings));
+  reference.file = folder + "/" + referenceName(referenceFrame(scene, job.camera, settings));
   writeExr(reference.file, estimates, result.image, nullptr, exr);
   const Estimate& e = estimates.estimates.front();
   reference.image = {e.mean, {e.half[0], e.half[1]}};

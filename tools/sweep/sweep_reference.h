@@ -41,19 +41,27 @@ struct SweepReference {
 
 // Reads and checks an EXR. The preferred integrator's layers are taken where there are several; an image without halves
 // serves too, but then its own noise is part of every error. Throws Error(BadInput) naming what differs: size, and for
-// files of braid also camera, scene, depth, and a seed in [firstSeed, firstSeed + seeds).
+// files of braid also camera, scene, depth, rendering revision, and a seed in [firstSeed, firstSeed + seeds).
 SweepReference readReference(const std::string& path, const ReferenceFrame& frame, const std::string& integrator,
                              uint64_t firstSeed, uint64_t seeds);
 
-// The kept reference of the frame if it was rendered by this integrator and version with at least so many samples, or
-// nothing. Throws Error(BadInput) when the file shows something else than its name says.
+// The kept reference of the frame if it was rendered by this integrator at this rendering revision with at least so
+// many samples, or nothing; then `stale`, unless null, gets a sentence if the revision is the reason. Throws
+// Error(BadInput) when the file shows something else than its name says.
 std::optional<SweepReference> keptReference(const std::string& folder, const ReferenceFrame& frame,
-                                            const std::string& integrator, uint64_t spp);
+                                            const std::string& integrator, uint64_t spp, std::string* stale = nullptr);
 
-// Renders a reference and keeps it in the folder; nothing when cancelled. `settings.integrators` names the integrator
-// and `settings.spp` the samples, rounded up to an even number for two equal halves.
-std::optional<SweepReference> renderReference(const std::string& folder, const Scene& scene, const CameraData& camera,
-                                              Settings settings, const std::vector<const Integrator*>& integrators,
+// What a reference is rendered of: `settings.integrators` names the integrator and `settings.spp` the samples, rounded
+// up to an even number for two equal halves.
+struct ReferenceJob {
+  const Scene& scene;
+  const CameraData& camera;
+  const Settings& settings;
+  const std::vector<const Integrator*>& integrators;
+};
+
+// Renders a reference and keeps it in the folder; nothing when cancelled.
+std::optional<SweepReference> renderReference(const std::string& folder, const ReferenceJob& job,
                                               const Session::ProgressCallback& progress,
                                               const std::atomic<bool>* cancel);
 

@@ -130,6 +130,16 @@ std::vector<double> Measurement::measure(const MethodImage& made, const Referenc
   return values;
 }
 
+std::string plannedIntegrators(const SweepScene& scene, Settings settings,
+                               const std::vector<const Integrator*>& integrators) {
+  settings.integrators = {"auto"};
+  settings.spp = 64;
+  std::string names;
+  for (const PlannedIntegrator& i : makePlan(*scene.scene, scene.camera, settings, integrators).integrators)
+    names += (names.empty() ? "" : "+") + std::string(i.integrator->name());
+  return names;
+}
+
 double SweepJob::lastMark() const {
   double last = 0;
   for (const Cell& c : cells) last = std::max(last, c.mark);

@@ -44,6 +44,10 @@ struct SweepScene {
   double loadSeconds = 0;
 };
 
+// The integrators that `auto` keeps for the scene, joined by '+'.
+std::string plannedIntegrators(const SweepScene& scene, Settings settings,
+                               const std::vector<const Integrator*>& integrators);
+
 // Cells of one session: methods × marks that have no row yet.
 struct SweepJob {
   Ladder ladder = Ladder::Samples;

@@ -136,27 +136,27 @@ PaperClaim Comparison::biasClaim() const {
     return std::find_if(biases_.begin(), biases_.end(),
                         [&](const ReplicateBias& b) { return b.scene == scene && b.method == method; });
   };
-  // A scene tells something only where the comparison is finer than a 20th of nfor's squared bias.
-  size_t scenes = 0, told = 0, held = 0;
+  // A scene resolves the claim only where the comparison is finer than a 20th of nfor's squared bias.
+  size_t scenes = 0, resolved = 0, held = 0;
   double own = 0, theirs = 0;
   for (const std::string& scene : cells_.scenes()) {
     const auto a = find(scene, kUncorrelated), b = find(scene, "nfor");
     if (a == biases_.end() || b == biases_.end()) continue;
     ++scenes;
     if (!(2 * a->standardError < b->squaredBias / 20)) continue;
-    ++told;
+    ++resolved;
     held += a->squaredBias <= b->squaredBias / 20 + 2 * a->standardError;
     own += a->squaredBias;
     theirs += b->squaredBias;
   }
-  if (told == 0) {
+  if (resolved == 0) {
     if (scenes > 0) result.measured = fmt::format("not resolved on any of {} scenes: give more seeds", scenes);
     return result;
   }
   result.measured = fmt::format("{} of {} scenes that resolve it ({} do not); mean squared bias {} against {}", held,
-                                told, scenes - told, shortNumber(own / static_cast<double>(told)),
-                                shortNumber(theirs / static_cast<double>(told)));
-  result.holds = held == told;
+                                resolved, scenes - resolved, shortNumber(own / static_cast<double>(resolved)),
+                                shortNumber(theirs / static_cast<double>(resolved)));
+  result.holds = held == resolved;
   return result;
 }
 
@@ -260,12 +260,12 @@ PaperClaim Comparison::errorMapClaim() const {
   const auto index = [&](const char* name) {
     return static_cast<size_t>(std::find(columns.begin(), columns.end(), name) - columns.begin());
   };
-  const size_t truth = index("relL2_unbiased"), told = index("estimated_error");
-  if (std::max(truth, told) >= columns.size()) return result;
+  const size_t truth = index("relL2_unbiased"), estimate = index("estimated_error");
+  if (std::max(truth, estimate) >= columns.size()) return result;
   size_t cells = 0, held = 0;
   double sum = 0;
   for (const SweepRow& r : table_.rows) {
-    const double ratio = r.values[told] / r.values[truth];
+    const double ratio = r.values[estimate] / r.values[truth];
     if (r.method != autoCase(r.scene).method || r.mark < 16 || !(ratio > 0)) continue;
     ++cells;
     held += ratio >= 0.5 && ratio <= 2;

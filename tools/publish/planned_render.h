@@ -11,7 +11,7 @@
 
 namespace braid {
 
-struct RenderPlan {
+struct PlannedRender {
   Plan plan;
   CombinePlan combinePlan;  // what is kept for combiners, and their skipReasons
   MemoryPlan memory;
@@ -27,7 +27,7 @@ struct RenderExtent {
 };
 
 // Where the default is left out, `choice` becomes "none".
-RenderPlan planRender(const Scene& scene, const CameraData& camera, const Settings& settings,
-                      const std::vector<const Integrator*>& integrators, CombineChoice& choice, RenderExtent extent);
+PlannedRender planRender(const Scene& scene, const CameraData& camera, const Settings& settings,
+                         const std::vector<const Integrator*>& integrators, CombineChoice& choice, RenderExtent extent);
 
 }  // namespace braid

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/publish/render_plan.h"
+#include "tools/publish/planned_render.h"
 
 #include <fmt/format.h>
 
@@ -19,35 +19,36 @@ std::string skipReasonOf(const CombinePlan& combinePlan, const std::vector<std::
 
 }  // namespace
 
-std::string RenderPlan::text() const {
+std::string PlannedRender::text() const {
   const std::string left = note.empty() ? "" : fmt::format("- {}\n", note);
   return plan.text() + combinePlanText(combinePlan) + left + memory.text();
 }
 
-RenderPlan planRender(const Scene& scene, const CameraData& camera, const Settings& settings,
-                      const std::vector<const Integrator*>& integrators, CombineChoice& choice, RenderExtent extent) {
-  RenderPlan p;
+PlannedRender planRender(const Scene& scene, const CameraData& camera, const Settings& settings,
+                         const std::vector<const Integrator*>& integrators, CombineChoice& choice,
+                         RenderExtent extent) {
+  PlannedRender p;
   const Plan bare = makePlan(scene, camera, settings, integrators);
   p.plan = bare;
   if (extent.resumed && !choice.asked)
-    p.combinePlan = makeCombinePlan(plannedEstimates(p.plan, extent.samples), choice.wanted(), choice.options().roles);
+    p.combinePlan = makeCombinePlan(plannedEstimates(p.plan, extent.samples), choice.methods, choice.options().roles);
   else
     p.combinePlan = planCombining(choice, extent.samples, p.plan);
   p.memory = planMemory(scene, p.plan, p.combinePlan, settings.spp);
-  if (choice.asked || choice.wanted().empty()) return p;
+  if (choice.asked || choice.methods.empty()) return p;
 
-  p.note = skipReasonOf(p.combinePlan, choice.wanted());
+  p.note = skipReasonOf(p.combinePlan, choice.methods);
   if (p.note.empty() && p.memory.total() > memoryLimit())
-    p.note = fmt::format("{}: takes more memory than the limit allows", choice.combine);
+    p.note = fmt::format("{}: takes more memory than the limit allows", choice.text());
   if (!p.note.empty()) {
-    choice.combine = "none";
+    choice.methods.clear();
     p.plan = bare;
     p.combinePlan = planCombining(choice, extent.samples, p.plan);  // denoisers may have been named
     p.memory = planMemory(scene, p.plan, p.combinePlan, settings.spp);
   }
   if (extent.goesOn && !extent.resumed) {
     CombineChoice later = choice;
-    later.combine = kDefaultMethod;
+    later.methods = {kDefaultMethod};
     planCombining(later, 0, p.plan);
     p.memory = planMemory(scene, p.plan, p.combinePlan, settings.spp);
   }

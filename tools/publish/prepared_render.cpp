@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/publish/prepared_render.h"
+
+#include "integrators/registry.h"
+#include "tools/publish/exr_metadata.h"
+#include "tools/publish/scene_identity.h"
+#include "version.h"
+
+namespace braid {
+
+PreparedRender prepareRender(const SceneChoice& scene, const Settings& settings, CombineChoice& combine,
+                             const RenderExtent& extent) {
+  PreparedRender r{openScene(scene), makeIntegrators(), {}};
+  r.planned = planRender(r.scene(), r.opened.camera, settings, pointersTo(r.integrators), combine, extent);
+  return r;
+}
+
+std::unique_ptr<Session> beginSession(const PreparedRender& render, const SceneChoice& choice) {
+  requireWithinLimit(render.planned.memory);
+  const Scene& scene = render.scene();
+  auto session = std::make_unique<Session>(scene, render.planned.plan);
+  session->identify(BRAID_VERSION, BRAID_BUILD_FLAGS, sceneIdentity(choice, scene.data()),
+                    planAttributes(scene, session->plan(), scene.accel().isa()));
+  return session;
+}
+
+}  // namespace braid
