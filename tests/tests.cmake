@@ -55,7 +55,7 @@ foreach(source IN LISTS test_sources)
   endif()
   add_test(NAME ${name} COMMAND ${program} --source-file=*${name}.cpp --minimal ${left_out})
   set_tests_properties(${name} PROPERTIES TIMEOUT 600)
-  if(name MATCHES "^test_(bdpt|registry|cli|calibration)$")
+  if(name MATCHES "^test_(bdpt|registry|registry_images|cli|calibration)$")
     set_tests_properties(${name} PROPERTIES COST 100)  # the longest ones begin first
   endif()
   if(source IN_LIST loading_sources)

@@ -26,14 +26,6 @@ inline std::vector<std::shared_ptr<const Method>> runnableMethods() {
   return list;
 }
 
-inline CaseOptions sized(int width, int height, uint64_t samples = 16) {
-  CaseOptions o;
-  o.width = width;
-  o.height = height;
-  o.samples = samples;
-  return o;
-}
-
 // Everything that a method may need: pt with history, crn, sppm, two denoised images as bases, and the truth.
 inline Estimates everything(const Case& c) {
   Estimates e = c.estimates;

@@ -196,4 +196,9 @@ inline std::string errorOf(const GltfFile& file, LoadOptions options = {}) {
     CHECK(text.find(part) != std::string::npos);  \
   } while (false)
 
+inline TriangleMesh onlyMesh(const SceneData& scene) {
+  REQUIRE(scene.meshes.size() == 1);
+  return scene.meshes[0];
+}
+
 }  // namespace braid::test

@@ -50,6 +50,13 @@ std::string script(const Folder& folder, const std::string& name, const std::str
   return path;
 }
 
+// A sweep of small images without a report.
+Run sweep(const Folder& folder, const std::string& methods, const std::string& rest) {
+  return braidRun(folder, "sweep '" BRAID_SOURCE_DIR
+                          "/scenes/cornell.glb' -q --size 16x12 --reference-spp 16 --no-plots --metric relL2 " +
+                              rest + " --methods \"" + methods + "\"");
+}
+
 }  // namespace
 
 TEST_CASE("External command: it reads and writes EXR or PFM in the units of the render, the image and both halves") {
@@ -119,17 +126,12 @@ TEST_CASE("External command: it ends soon after it is told to") {
   findMethod("external-command:sleep 60; cp {color} {out}")->run(in);
 }
 
-TEST_CASE("Sweeps run external commands in every cell, and fail with their names when these do") {
+TEST_CASE("Sweeps run external commands in every cell") {
   const Folder folder;
-  const std::string scene = "'" BRAID_SOURCE_DIR "/scenes/cornell.glb'";
   const std::string copy = "external-command:cp {color} {out}",
                     box = "external-command:'" BRAID_BINARY
                           "' combine -q --float --unbiased {color} --method box -o {out}";
-  const auto sweep = [&](const std::string& methods, const std::string& rest) {
-    return braidRun(folder, "sweep " + scene + " -q --size 16x12 --reference-spp 16 --no-plots --metric relL2 " + rest +
-                                " --methods \"" + methods + "\"");
-  };
-  const Run run = sweep("pt," + copy + ",js@" + copy + ",box," + box, "--spp 4:8 -o good");
+  const Run run = sweep(folder, "pt," + copy + ",js@" + copy + ",box," + box, "--spp 4:8 -o good");
   INFO(run.err);
   CHECK(run.code == 0);
   const SweepTable table = readSweepTable(folder.path / "good/sweep.csv");
@@ -147,7 +149,10 @@ TEST_CASE("Sweeps run external commands in every cell, and fail with their names
     CHECK(row(box, mark).denoise > 0);
     CHECK(row("js@" + copy, mark).denoise > 0);
   }
+}
 
+TEST_CASE("A sweep whose external command fails in some cells names it, and goes on where it stopped") {
+  const Folder folder;
   // Fails from the second cell on, by its size; then works.
   const std::string moody = script(folder, "moody",
                                    "if [ -e '" + (folder.path / "well").string() +
@@ -161,27 +166,30 @@ TEST_CASE("Sweeps run external commands in every cell, and fail with their names
                                        "[ $n -lt 3 ] && exec cp $1 $2\n"
                                        "echo out of licences >&2; exit 3");
   const std::string method = "external-command:" + moody + " {color} {out}";
-  const Run partly = sweep("pt," + method, "--spp 4:8 -o partly");
+  const Run partly = sweep(folder, "pt," + method, "--spp 4:8 -o partly");
   CHECK(partly.code == 2);
   CHECK(contains(partly.err, "1 cells failed"));
   CHECK(contains(partly.err, "out of licences"));
   CHECK(readSweepTable(folder.path / "partly/sweep.csv").rows.size() == 3);
   folder.write("well", "");
-  const Run again = sweep("pt," + method, "--spp 4:8 -o partly");
+  const Run again = sweep(folder, "pt," + method, "--spp 4:8 -o partly");
   INFO(again.err);
   CHECK(again.code == 0);
   CHECK(readSweepTable(folder.path / "partly/sweep.csv").rows.size() == 4);
+}
 
-  const Run never = sweep("pt,external-command:false {color} {out}", "--spp 4 -o never");
+TEST_CASE("A sweep fails with the name of an external command that never ran") {
+  const Folder folder;
+  const Run never = sweep(folder, "pt,external-command:false {color} {out}", "--spp 4 -o never");
   CHECK(never.code == 2);
   CHECK(contains(never.err, "external-command:false {color} {out} never ran: the command failed with exit code 1"));
   CHECK(readSweepTable(folder.path / "never/sweep.csv").rows.size() == 1);
   const Run late =
-      sweep("pt,external-command:sleep 20; cp {color} {out}", "--spp 4 -o late --external-command-timeout 0.1");
+      sweep(folder, "pt,external-command:sleep 20; cp {color} {out}", "--spp 4 -o late --external-command-timeout 0.1");
   CHECK(late.code == 2);
   CHECK(contains(late.err, "took longer than 0.1 s"));
   // Too few samples for it, in every cell.
-  const Run few = sweep("pt,js", "--spp 1:2 -o few");
+  const Run few = sweep(folder, "pt,js", "--spp 1:2 -o few");
   CHECK(few.code == 2);
   CHECK(contains(few.err, "js never ran: "));
 }

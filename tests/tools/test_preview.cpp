@@ -134,24 +134,8 @@ std::vector<std::string> listeners(int port) {
 
 Rgb<float> grey(int width, int height, float value) { return Rgb<float>(width, height, value); }
 
-}  // namespace
-
-TEST_CASE("A running preview answers with page, state and images, and a stop saves") {
-  const Folder folder;
-  const std::string file = folder.path / "out.exr";
-  Preview preview(folder, {"-o", file});
-  const Answer page = ask(preview.port(), "GET", "/");
-  CHECK(page.status == 200);
-  CHECK(contains(page.header("Content-Type"), "text/html"));
-  CHECK((page.body == readText(BRAID_SOURCE_DIR "/tools/preview/page.html")));
-  CHECK_FALSE(contains(page.body, "http://"));  // nothing from elsewhere
-  CHECK_FALSE(contains(page.body, "https://"));
-
-  Json s;
-  CHECK(waitUntil([&] {
-    s = stateOf(preview);
-    return s["estimatedError"]["combined"].is_number() && s["spp"] >= 4;
-  }));
+// What a preview of 48x32 pixels tells while it renders to the file.
+void checkState(const Json& s, const std::string& file) {
   CHECK(s["schema"] == 1);
   CHECK(s["phase"] == "rendering");
   CHECK(s["stopped"] == false);
@@ -176,7 +160,9 @@ TEST_CASE("A running preview answers with page, state and images, and a stop sav
     CHECK(points.back()[2] == s["estimatedError"][view]);
     CHECK(s["estimatedError"][view].get<double>() > 0);
   }
+}
 
+void checkImages(const Preview& preview) {
   for (const auto& [view, channels] :
        {std::pair("noisy", 3), {"combined", 3}, {"error", 1}, {"noisy-error", 1}, {"combined-error", 1}}) {
     INFO(view);
@@ -192,7 +178,9 @@ TEST_CASE("A running preview answers with page, state and images, and a stop sav
     CHECK(largest > 0);
     CHECK(std::isfinite(largest));
   }
+}
 
+void checkRequests(const Preview& preview, const Json& s) {
   // An answer to ?after comes when there is something newer.
   const Answer newer = ask(preview.port(), "GET", "/state.json?after=" + stateOf(preview)["version"].dump());
   CHECK(newer.json()["version"] > s["version"]);
@@ -206,6 +194,29 @@ TEST_CASE("A running preview answers with page, state and images, and a stop sav
   CHECK(ask(preview.port(), "GET", "/state.json", "", "localhost:1234").status == 200);
   CHECK(ask(preview.port(), "POST", "/stop", "Origin: http://elsewhere.example\r\n").status == 403);
   CHECK(ask(preview.port(), "GET", "/stop").status == 405);
+}
+
+}  // namespace
+
+TEST_CASE("A running preview answers with page, state and images, and a stop saves") {
+  const Folder folder;
+  const std::string file = folder.path / "out.exr";
+  Preview preview(folder, {"-o", file});
+  const Answer page = ask(preview.port(), "GET", "/");
+  CHECK(page.status == 200);
+  CHECK(contains(page.header("Content-Type"), "text/html"));
+  CHECK((page.body == readText(BRAID_SOURCE_DIR "/tools/preview/page.html")));
+  CHECK_FALSE(contains(page.body, "http://"));  // nothing from elsewhere
+  CHECK_FALSE(contains(page.body, "https://"));
+
+  Json s;
+  CHECK(waitUntil([&] {
+    s = stateOf(preview);
+    return s["estimatedError"]["combined"].is_number() && s["spp"] >= 4;
+  }));
+  checkState(s, file);
+  checkImages(preview);
+  checkRequests(preview, s);
   CHECK(stateOf(preview)["phase"] == "rendering");
   CHECK_FALSE(fs::exists(file));
 

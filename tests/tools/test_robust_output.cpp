@@ -61,13 +61,28 @@ class TinyDisk {
   bool mounted_ = false;
 };
 
+struct RenderFiles {
+  fs::path state, image, log;
+};
+
+// Kills a render so many seconds after it has begun to trace, or else after it was started.
+void killRender(const RenderFiles& files, double saveEvery, bool tracing, double delay) {
+  fs::remove(files.log);
+  Process process({"--size", "24x16", "--integrator", "pt,crn", "--reproducible", "--threads", "2", "--time", "60",
+                   "--save-every", std::to_string(saveEvery), "--checkpoint", files.state.string(), "--resume", "-o",
+                   files.image.string(), "--log-json", files.log.string()});
+  if (tracing) REQUIRE(waitUntil([&] { return contains(readText(files.log), "\"plan\""); }));
+  sleepFor(delay);
+  process.signal(SIGKILL);
+  CHECK(process.wait() == -SIGKILL);
+}
+
 }  // namespace
 
 TEST_CASE("Killed at any moment, fifty times, a render leaves whole files and loses one save interval at most") {
   const Folder folder;
   const fs::path state = folder.path / "k.state", image = folder.path / "k.exr", log = folder.path / "log";
   constexpr double kSaveEvery = 0.02;
-  const std::vector<std::string> view{"--size", "24x16", "--integrator", "pt,crn", "--reproducible", "--threads", "2"};
   std::mt19937 random(7);
   std::uniform_real_distribution<double> delay(0, 0.08);
   uint64_t rounds = 0;
@@ -75,19 +90,8 @@ TEST_CASE("Killed at any moment, fifty times, a render leaves whole files and lo
   int resumed = 0, images = 0, leftOver = 0;
   for (int kill = 0; kill < 50; ++kill) {
     const double secondsBefore = rounds > 0 ? readStateHeader(state).seconds : 0;
-    std::vector<std::string> words = view;
-    for (const std::string& w :
-         {std::string("--time"), std::string("60"), std::string("--save-every"), std::to_string(kSaveEvery),
-          std::string("--checkpoint"), state.string(), std::string("--resume"), std::string("-o"), image.string(),
-          std::string("--log-json"), log.string()})
-      words.push_back(w);
-    fs::remove(log);
-    Process process(words);
     // Most kills fall into the pass loop, some into starting up.
-    if (kill % 5 != 0) REQUIRE(waitUntil([&] { return contains(readText(log), "\"plan\""); }));
-    sleepFor(delay(random));
-    process.signal(SIGKILL);
-    CHECK(process.wait() == -SIGKILL);
+    killRender({state, image, log}, kSaveEvery, kill % 5 != 0, delay(random));
 
     for (const std::string& name : filesIn(folder.path)) leftOver += contains(name, ".tmp-");
     if (fs::exists(image)) {

@@ -61,6 +61,22 @@ Rgb<float> noisy(std::mt19937& random, float mean, float deviation) {
   return image;
 }
 
+SweepTable threeScenes() {
+  return tableOf({{"room", "pt", 16, 1, 0.4},
+                  {"room", "js@nfor", 16, 1, 0.2},
+                  {"room", "pt/auto", 16, 1, 0.1},
+                  {"room", "ensemble@nfor+rdfc", 16, 1, 0.3},
+                  {"room", "ensemble-oracle@nfor+rdfc", 16, 1, 0.15},
+                  {"pool", "pt", 16, 1, 8},
+                  {"pool", "js@nfor", 16, 1, 9},
+                  {"pool", "bdpt", 16, 1, 4},
+                  {"pool", "sppm", 16, 1, 0.1},
+                  {"pool", "bdpt+sppm/auto", 16, 1, 0.12},
+                  {"hall", "pt", 16, 1, 0.9},
+                  {"hall", "sppm", 16, 1, 0.5},
+                  {"hall", "pt+sppm/auto", 16, 1, 0.3}});
+}
+
 }  // namespace
 
 TEST_CASE("Cells are ratios of means over seeds, in cells that all methods have") {
@@ -90,19 +106,7 @@ TEST_CASE("Cells are ratios of means over seeds, in cells that all methods have"
 }
 
 TEST_CASE("Claims hold or not by their cells, and say when nothing was measured") {
-  const SweepTable t = tableOf({{"room", "pt", 16, 1, 0.4},
-                                {"room", "js@nfor", 16, 1, 0.2},
-                                {"room", "pt/auto", 16, 1, 0.1},
-                                {"room", "ensemble@nfor+rdfc", 16, 1, 0.3},
-                                {"room", "ensemble-oracle@nfor+rdfc", 16, 1, 0.15},
-                                {"pool", "pt", 16, 1, 8},
-                                {"pool", "js@nfor", 16, 1, 9},
-                                {"pool", "bdpt", 16, 1, 4},
-                                {"pool", "sppm", 16, 1, 0.1},
-                                {"pool", "bdpt+sppm/auto", 16, 1, 0.12},
-                                {"hall", "pt", 16, 1, 0.9},
-                                {"hall", "sppm", 16, 1, 0.5},
-                                {"hall", "pt+sppm/auto", 16, 1, 0.3}});
+  const SweepTable t = threeScenes();
   const SweepSummary summary = summarise(t, {"room", "pool", "hall"},
                                          {"pt", "js@nfor", "pt/auto", "bdpt", "sppm", "bdpt+sppm/auto", "pt+sppm/auto",
                                           "ensemble@nfor+rdfc", "ensemble-oracle@nfor+rdfc"});

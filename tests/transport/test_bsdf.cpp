@@ -203,6 +203,39 @@ TEST_CASE("bsdf: no more light leaves than arrives") {
   CHECK(largest < 1.006);
 }
 
+// A surface of these lobes; `variant` sets everything else.
+SurfaceParameters extremeSurface(uint32_t lobes, float roughness, float index, int variant) {
+  SurfaceParameters p;
+  p.lobes = lobes;
+  p.roughness = p.clearcoatRoughness = p.sheenRoughness = roughness;
+  p.etaInside = index;
+  p.entering = variant & 1;
+  p.thinWalled = variant & 2;
+  p.baseColor = p.sheenColor = p.specularF0 = p.diffuseTransmissionColor = Spectrum((variant & 4) ? 1.0f : 0.0f);
+  p.metallic = 0.5f * static_cast<float>(variant % 3);
+  p.transmission = 0.5f * static_cast<float>(variant / 3 % 3);
+  p.clearcoat = p.iridescence = p.anisotropy = p.diffuseTransmission = (variant & 8) ? 1.0f : 0.3f;
+  p.iridescenceIor = (variant & 16) ? 1.0f : 1.5f;
+  p.iridescenceThickness = (variant & 8) ? 0.0f : 300.0f;
+  return p;
+}
+
+void checkUsable(const Bsdf& bsdf, const Vec3& wo, Rng& rng) {
+  CHECK(usable(bsdf.albedo()));
+  for (const Vec3& wi : {squareToUniformSphere(rng.next2()), Vec3(-wo.x, -wo.y, wo.z), -wo, wo, Vec3(1, 0, 0)}) {
+    const BsdfValue v = bsdf.evaluate(wi, true);
+    const bool good = usable(v.f) && std::isfinite(v.pdfW) && v.pdfW >= 0 && std::isfinite(v.pdfRevW) && v.pdfRevW >= 0;
+    CHECK(good);
+  }
+  for (const Vec2& u : {rng.next2(), Vec2(0), Vec2(kOneMinusEpsilon)}) {
+    BsdfSample s;
+    if (!bsdf.sample(rng.next(), u, s)) continue;
+    const bool good = usable(s.weight) && isFinite(s.wi) && std::isfinite(s.pdfW) && s.pdfW > 0 &&
+                      std::fabs(glm::length(s.wi) - 1) < 1e-4f;
+    CHECK(good);
+  }
+}
+
 TEST_CASE("bsdf: every extreme stays finite and non-negative") {
   Rng rng(7);
   const float roughnesses[] = {0, 1e-4f, 1e-3f, 0.03f, 0.032f, 1};
@@ -219,40 +252,14 @@ TEST_CASE("bsdf: every extreme stays finite and non-negative") {
     for (const float roughness : roughnesses) {
       for (const float index : indices) {
         for (int variant = 0; variant < 24; ++variant) {
-          SurfaceParameters p;
-          p.lobes = set;
-          p.roughness = p.clearcoatRoughness = p.sheenRoughness = roughness;
-          p.etaInside = index;
-          p.entering = variant & 1;
-          p.thinWalled = variant & 2;
-          p.baseColor = p.sheenColor = p.specularF0 = p.diffuseTransmissionColor =
-              Spectrum((variant & 4) ? 1.0f : 0.0f);
-          p.metallic = 0.5f * static_cast<float>(variant % 3);
-          p.transmission = 0.5f * static_cast<float>(variant / 3 % 3);
-          p.clearcoat = p.iridescence = p.anisotropy = p.diffuseTransmission = (variant & 8) ? 1.0f : 0.3f;
-          p.iridescenceIor = (variant & 16) ? 1.0f : 1.5f;
-          p.iridescenceThickness = (variant & 8) ? 0.0f : 300.0f;
+          const SurfaceParameters p = extremeSurface(set, roughness, index, variant);
           for (const float z : {1.0f, 0.3f, 1e-4f, 0.0f, -0.2f}) {
             const float side = std::sqrt(1 - z * z), phi = 7 * rng.next();
             const Vec3 wo(side * std::cos(phi), side * std::sin(phi), z);
             const Bsdf bsdf(p, wo);
             INFO("lobes " << set << " roughness " << roughness << " index " << index << " variant " << variant << " z "
                           << z);
-            CHECK(usable(bsdf.albedo()));
-            for (const Vec3& wi :
-                 {squareToUniformSphere(rng.next2()), Vec3(-wo.x, -wo.y, wo.z), -wo, wo, Vec3(1, 0, 0)}) {
-              const BsdfValue v = bsdf.evaluate(wi, true);
-              const bool good =
-                  usable(v.f) && std::isfinite(v.pdfW) && v.pdfW >= 0 && std::isfinite(v.pdfRevW) && v.pdfRevW >= 0;
-              CHECK(good);
-            }
-            for (const Vec2& u : {rng.next2(), Vec2(0), Vec2(kOneMinusEpsilon)}) {
-              BsdfSample s;
-              if (!bsdf.sample(rng.next(), u, s)) continue;
-              const bool good = usable(s.weight) && isFinite(s.wi) && std::isfinite(s.pdfW) && s.pdfW > 0 &&
-                                std::fabs(glm::length(s.wi) - 1) < 1e-4f;
-              CHECK(good);
-            }
+            checkUsable(bsdf, wo, rng);
           }
         }
       }

@@ -61,11 +61,8 @@ TEST_CASE("One-hot methods select by pixel, and smoothing selections beats the r
   }
 }
 
-TEST_CASE("The SBF filter keeps constants, is the formula at a pixel, and does not cross edges of features") {
-  CaseOptions o;
-  o.width = 20;
-  o.height = 14;
-  const Case c = makeCase(o);
+TEST_CASE("The SBF filter keeps constants and is the formula at a pixel") {
+  const Case c = caseOf(20, 14, 32);
   const std::vector<Plane<float>> flat = {Plane<float>(20, 14, 0.37f)};
   const std::vector<Plane<float>> kept = featureFiltered(flat, &*c.estimates.features, 32);
   for (const float v : kept[0].data) CHECK(v == doctest::Approx(0.37f).epsilon(1e-5));
@@ -99,8 +96,10 @@ TEST_CASE("The SBF filter keeps constants, is the formula at a pixel, and does n
     bottom += w;
   }
   CHECK(static_cast<double>(filtered[p]) == doctest::Approx(top / bottom).epsilon(1e-4));
+}
 
-  Features f = *c.estimates.features;
+TEST_CASE("The SBF filter does not cross edges of features") {
+  Features f = *caseOf(20, 14, 32).estimates.features;
   for (size_t i = 0; i < f.depth.mean.size(); ++i) {
     const float side = i % 20 < 10 ? 0.0f : 1.0f;
     f.normal.mean.set(i, Vec3(side, 0, 1 - side));

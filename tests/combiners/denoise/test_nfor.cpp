@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// NFOR: its features, its stored weights, and what the regression of crossed halves promises.
+// NFOR: what the regression of crossed halves promises, its options and its extremes.
 #include <array>
 #include <cmath>
 
@@ -7,43 +7,18 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include "combiners/denoise/nfor/feature_prefilter.h"
 #include "combiners/denoise/nfor/nfor_filter.h"
-#include "combiners/denoise/nlm/nlm_filter.h"
-#include "combiners/denoise/nlm/nlm_window_weights.h"
 #include "combiners/pipeline/registry.h"
 #include "renderer/core/error.h"
+#include "tests/combiners/denoise/nfor_cases.h"
 #include "tests/support/combiner_fixture.h"
 
 namespace braid::test_nfor {
 
 using namespace test;
+using namespace test::nfor_cases;
 
 namespace {
-
-CaseOptions sized(int width, int height, uint64_t samples) {
-  CaseOptions o;
-  o.width = width;
-  o.height = height;
-  o.samples = samples;
-  return o;
-}
-
-NforResult filtered(const Case& c, const NforOptions& options = {}) {
-  return nforFilter(c.pt(), c.estimates.features ? &*c.estimates.features : nullptr, options);
-}
-
-// As in the paper, but for the distance of the models.
-NforOptions plain(int stride = 1) {
-  NforOptions o;
-  o.demodulate = o.offsets = false;
-  o.stride = stride;
-  return o;
-}
-
-double relativeError(const Rgb<float>& image, const Rgb<float>& truth) {
-  return std::sqrt(meanSquaredError(image, truth) / meanSquaredError(Rgb<float>(truth.width(), truth.height()), truth));
-}
 
 // An estimate of `truth` whose samples vary by `noise`, relative to it.
 Estimate noisy(const Rgb<float>& truth, const CaseOptions& o, double noise) {
@@ -53,104 +28,7 @@ Estimate noisy(const Rgb<float>& truth, const CaseOptions& o, double noise) {
   });
 }
 
-double correlation(const Rgb<float>& a, const Rgb<float>& b, const Rgb<float>& truth) {
-  double ab = 0, aa = 0, bb = 0;
-  for (size_t c = 0; c < 3; ++c)
-    for (size_t i = 0; i < truth.size(); ++i) {
-      // Relative to the truth, so that bright pixels do not count for all.
-      const double t = static_cast<double>(truth[c][i]);
-      const double x = (static_cast<double>(a[c][i]) - t) / t, y = (static_cast<double>(b[c][i]) - t) / t;
-      ab += x * y;
-      aa += x * x;
-      bb += y * y;
-    }
-  return ab / std::sqrt(aa * bb);
-}
-
 }  // namespace
-
-TEST_CASE("Stored weights are those of non-local means at every centre, to 16 bits, and at half the sensitivity") {
-  for (const auto& [width, height] : {std::array{1, 1}, {7, 3}, {150, 41}}) {
-    const Case c = caseOf(width, height, 16);
-    const Estimate& e = c.pt();
-    const NlmGuide guide = nlmGuide(e.mean, e.variance, 1, 1), half = nlmGuide(e.mean, e.variance, 0.5f, 1);
-    const PixelRect all = {0, 0, width, height};
-    for (const int stride : {1, 2, 3}) {
-      CAPTURE(width);
-      CAPTURE(stride);
-      const NlmWindowStore store(std::span(&guide, 1), 4, stride);
-      NlmWeights weights(std::span(&guide, 1), 4, all), halfWeights(std::span(&half, 1), 4, all);
-      double worst = 0, worstHalf = 0;
-      for (int dy = -4; dy <= 4; ++dy)
-        for (int dx = -4; dx <= 4; ++dx) {
-          const float *w = weights.at(dx, dy), *wh = halfWeights.at(dx, dy);
-          for (int r = 0; r < centreCount(height, stride); ++r)
-            for (int k = 0; k < centreCount(width, stride); ++k) {
-              const int cx = centrePosition(k, width, stride), cy = centrePosition(r, height, stride);
-              if (cx + dx < 0 || cx + dx >= width || cy + dy < 0 || cy + dy >= height) continue;
-              const int x0 = std::max(0, cx - 4), x1 = std::min(width, cx + 5);
-              float row[9 + WindowWeights::kRowSlack];
-              const auto at = static_cast<size_t>(cy * width + cx), inRow = static_cast<size_t>(cx + dx - x0);
-              NlmWindowWeights(store, false).row(cx, cy, cy + dy, x0, x1, row);
-              worst = std::max(worst, std::fabs(static_cast<double>(row[inRow] - w[at])));
-              NlmWindowWeights(store, true).row(cx, cy, cy + dy, x0, x1, row);
-              worstHalf = std::max(worstHalf, std::fabs(static_cast<double>(row[inRow] - wh[at])));
-            }
-        }
-      CHECK(worst < 1e-5);
-      CHECK(worstHalf < 0.01);  // the epsilon of distances is divided by k² too, which matters where variance is small
-    }
-  }
-}
-
-TEST_CASE("The zero-order means beside the stored weights are those of the filter, at both sensitivities") {
-  const Case c = caseOf(150, 41, 16);
-  const Estimate& e = c.pt();
-  const NlmGuide guide = nlmGuide(e.mean, e.variance, 1, 1), half = nlmGuide(e.mean, e.variance, 0.5f, 1);
-  std::array<Rgb<float>, 2> means = {Rgb<float>(150, 41), Rgb<float>(150, 41)};
-  const NlmWindowStore store(std::span(&guide, 1), 4, 2, &e.half[0], &means);
-  CHECK(relativeError(means[0], nlmFilter(guide, 4, e.half[0])) < 1e-5);
-  CHECK(relativeError(means[1], nlmFilter(half, 4, e.half[0])) < 1e-3);
-  CHECK(relativeError(means[1], nlmFilter(guide, 4, e.half[0])) > 1e-2);
-}
-
-TEST_CASE("Prefiltered features lose most of their noise, half by half, with weights of the other half") {
-  CaseOptions o = sized(96, 72, 16);
-  o.featureNoise = 0.2;
-  const Case c = makeCase(o);
-  o.featureNoise = 0;
-  const Case clean = makeCase(o);
-  const Features& f = *c.estimates.features;
-  const FeatureHalves out = crossPrefiltered(&f), truth = crossPrefiltered(&*clean.estimates.features);
-  REQUIRE(out.half[0].planes.size() == 8);
-  REQUIRE(out.half[0].groups().size() == 4);
-  const auto error = [](const Plane<float>& a, const Plane<float>& b) {
-    double sum = 0;
-    for (size_t i = 0; i < a.size(); ++i) sum += sqr(static_cast<double>(a[i]) - static_cast<double>(b[i]));
-    return sum / static_cast<double>(a.size());
-  };
-  const FeatureChannels mean = prefilteredMean(out);
-  double before = 0, half = 0, both = 0;
-  for (size_t k = 0; k < 6; ++k) {
-    const Rgb<float>* const halves = k < 3 ? f.albedo.half : f.normal.half;
-    const Plane<float>& expected =
-        (k < 3 ? clean.estimates.features->albedo : clean.estimates.features->normal).mean[k % 3];
-    before += error(halves[0][k % 3], expected);
-    half += error(out.half[0].planes[k], expected);
-    both += error(mean.planes[k], expected);
-    CHECK(error(truth.half[0].planes[k], expected) < 1e-7);  // without noise nothing is blurred
-  }
-  CAPTURE(before / half);
-  CAPTURE(half / both);
-  CHECK(half < before / 4);
-  CHECK(both < half / 1.3);
-  // Crossed: twice the feature in half A is twice the filtered half A.
-  Features scaled = f;
-  for (float& v : scaled.depth.half[0].data) v *= 2;
-  const FeatureHalves again = crossPrefiltered(&scaled);
-  for (size_t i = 0; i < out.half[0].planes[6].size(); ++i)
-    CHECK(again.half[0].planes[6][i] == doctest::Approx(2 * out.half[0].planes[6][i]).epsilon(1e-5));
-}
 
 TEST_CASE("Images without noise are reproduced, whatever the options") {
   CaseOptions o = sized(48, 36, 8);
@@ -222,76 +100,6 @@ TEST_CASE("Four times the samples shrink the error of nfor") {
     CHECK(error < 0.6 * last);
     last = error;
   }
-}
-
-TEST_CASE("A half of the result keeps noise of its own samples and none of the other half's") {
-  // The errors of both halves are all but uncorrelated, else ensembles would take their sum for a bias. The limit is
-  // several times what seeds differ by.
-  const Case c = caseOf(96, 72, 16);
-  const NforResult r = filtered(c, plain(2));
-  for (size_t h = 0; h < 2; ++h) {
-    const double own = correlation(r.half[h], c.pt().half[h], c.truth);
-    const double other = correlation(r.half[h], c.pt().half[1 - h], c.truth);
-    CAPTURE(own);
-    CAPTURE(other);
-    CHECK(own > 0.05);
-    CHECK(std::fabs(other) < 0.03);
-  }
-}
-
-TEST_CASE("The error of the halves of nfor can be estimated from the other half") {
-  // Too small by 10 to 55 %: the selection takes the candidate that is nearer to the other half.
-  double estimated = 0, actual = 0;
-  for (const uint64_t seed : {1, 2, 3}) {
-    CaseOptions o = sized(64, 48, 16);
-    o.noise = 1;
-    o.seed = seed;
-    const Case c = makeCase(o);
-    const NforResult r = filtered(c);
-    for (size_t h = 0; h < 2; ++h) {
-      estimated += meanSquaredError(r.half[h], c.pt().half[1 - h]) -
-                   meanSquaredError(c.truth, c.pt().half[1 - h]);  // the noise itself, rather than its estimate
-      actual += meanSquaredError(r.half[h], c.truth);
-    }
-  }
-  CAPTURE(estimated / actual);
-  CHECK(estimated > 0.4 * actual);
-  CHECK(estimated < 1.5 * actual);
-}
-
-TEST_CASE("The result lies near the mean of its halves and is better than it") {
-  const Case c = caseOf(64, 48, 16);
-  const NforResult r = filtered(c);
-  const Rgb<float> mean = average(r.half[0], r.half[1]);
-  CHECK(relativeError(r.mean, mean) < 0.15);
-  CHECK(meanSquaredError(r.mean, c.truth) < meanSquaredError(mean, c.truth));
-  CHECK(meanSquaredError(mean, c.truth) < meanSquaredError(r.half[0], c.truth));
-}
-
-TEST_CASE("Pixels of one half change that half, and the other one by weights alone") {
-  const Case c = caseOf(64, 48, 32);
-  Estimate changed = c.pt();
-  // A patch of half B is a tenth brighter, the mean as it says.
-  for (size_t k = 0; k < 3; ++k)
-    for (int y = 20; y < 24; ++y)
-      for (int x = 40; x < 44; ++x) {
-        const float v = changed.half[1][k].at(x, y);
-        changed.half[1][k].at(x, y) += 0.1f * v;
-        changed.mean[k].at(x, y) += 0.05f * v;
-      }
-  const NforResult before = filtered(c, plain(2)), after = nforFilter(changed, &*c.estimates.features, plain(2));
-  const auto change = [&](size_t h, int x0, int x1) {
-    double sum = 0;
-    for (size_t k = 0; k < 3; ++k)
-      for (int y = 20; y < 24; ++y)
-        for (int x = x0; x < x1; ++x)
-          sum += std::fabs(static_cast<double>(after.half[h][k].at(x, y) - before.half[h][k].at(x, y)));
-    return sum;
-  };
-  CAPTURE(change(0, 40, 44) / change(1, 40, 44));
-  CHECK(change(1, 40, 44) > 3 * change(0, 40, 44));
-  CHECK(change(0, 0, 6) == 0);  // out of reach of the windows
-  CHECK(change(1, 0, 6) == 0);
 }
 
 TEST_CASE("Without features, and with empty ones, nfor is a regression on offsets that still removes noise") {

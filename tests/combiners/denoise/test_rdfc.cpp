@@ -28,14 +28,6 @@ Case cleanCase() {
   return makeCase(o);
 }
 
-CaseOptions sized(int width, int height, uint64_t samples) {
-  CaseOptions o;
-  o.width = width;
-  o.height = height;
-  o.samples = samples;
-  return o;
-}
-
 }  // namespace
 
 TEST_CASE("RDFC returns an image without noise, whatever the options") {

@@ -24,15 +24,6 @@ namespace {
 
 MethodResult run(const char* name, const MethodInputs& in) { return findMethod(name)->run(in); }
 
-CaseOptions sized(int width, int height, uint64_t samples = 16, uint64_t seed = 1) {
-  CaseOptions o;
-  o.width = width;
-  o.height = height;
-  o.samples = samples;
-  o.seed = seed;
-  return o;
-}
-
 double meanOf(const Plane<float>& p) {
   double sum = 0;
   for (const float v : p.data) sum += static_cast<double>(v);
