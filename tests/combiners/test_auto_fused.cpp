@@ -71,13 +71,13 @@ TEST_CASE(
   const Rgb<float> halves[2] = {Rgb<float>(40, 30, static_cast<float>(1 + b)),
                                 Rgb<float>(40, 30, static_cast<float>(1 + b))};
   const double unit = 1.01, measured = unit * b * b / (unit + v);
-  CHECK(errorMap(halves, x, x.variance, x.mean)[500] == doctest::Approx(measured).epsilon(1e-3));
-  CHECK(errorMap(halves, x, x.variance, x.mean, true)[500] ==
+  CHECK(crossHalfErrorMap(halves, x, x.variance, x.mean)[500] == doctest::Approx(measured).epsilon(1e-3));
+  CHECK(crossHalfErrorMap(halves, x, x.variance, x.mean, {true, 1})[500] ==
         doctest::Approx(measured * 2 * v / (2 * v + b * b)).epsilon(1e-3));
-  CHECK(errorMap(halves, x, x.variance, x.mean, true, 0.5)[500] ==
+  CHECK(crossHalfErrorMap(halves, x, x.variance, x.mean, {true, 0.5})[500] ==
         doctest::Approx(0.5 * measured * 2 * v / (2 * v + b * b)).epsilon(1e-3));
   const Estimate exact = flat(1.0f, 0.0f);
-  CHECK(errorMap(exact.half, exact, exact.variance, exact.mean, true)[500] == 0);
+  CHECK(crossHalfErrorMap(exact.half, exact, exact.variance, exact.mean, {true, 1})[500] == 0);
 }
 
 TEST_CASE("Where the unbiased image has not found the light, the photon map is believed") {
@@ -100,7 +100,7 @@ TEST_CASE("A noisy lamp lends the dark pixels around it no error that they canno
   Estimate x = flat(0.01f, 1e-8f);
   const size_t lamp = x.mean[0].index(20, 15);
   setPixel(x, lamp, 100, {90, 110, 95, 105}, 16);
-  const Plane<float> error = errorMap(x.half, x, x.variance, x.mean);
+  const Plane<float> error = crossHalfErrorMap(x.half, x, x.variance, x.mean);
   const double beside = static_cast<double>(error[lamp + 3]);
   CHECK(static_cast<double>(error[lamp]) > 0.1);
   CHECK(beside / 0.01 < 0.02);  // relative; the lamp's own relative error is 0.0056

@@ -76,7 +76,7 @@ TEST_CASE("Estimates fill their roles, and names override the rules") {
   CHECK(step("inverse-variance", named).unbiased == "bdpt");
   CHECK(step("inverse-variance", named).biased == "box");
   named.unbiased = "vcm";
-  CHECK(contains(step("inverse-variance", named).skipReason, "vcm, which there is not"));
+  CHECK(contains(step("inverse-variance", named).skipReason, "vcm, which does not exist"));
   CHECK(step("average", boxes()).bases == std::vector<std::string>{"box", "sppm"});
   // An estimate that is consistent only takes the place where nothing is unbiased, and is no input beside itself.
   const AvailableEstimates before = available;
@@ -190,14 +190,14 @@ TEST_CASE("An unknown name is a usage error that lists the known ones") {
 }
 
 TEST_CASE("What must be kept during a render is the union of what the steps need") {
-  CHECK_FALSE(needsOf(makeCombinePlan(everythingAvailable(), {"box"}, {})).quarters);
+  CHECK_FALSE(buffersOf(makeCombinePlan(everythingAvailable(), {"box"}, {})).quarters);
   for (const auto& m : makeMethods()) {
     const CombinePlan combinePlan = makeCombinePlan(everythingAvailable(), {m->name()}, boxes());
     if (!combinePlan.find(m->name())->skipReason.empty()) continue;
-    const CombinePlanNeeds all = needsOf(combinePlan);
+    const KeptBuffers all = buffersOf(combinePlan);
     CHECK(all.quarters >= m->needs().quarters);
-    CHECK(all.features >= m->needs().features);
-    CHECK(all.checkpoints >= m->needs().checkpoints);
+    CHECK(all.features >= m->needs().helpful.features);
+    CHECK(all.history >= (m->needs().checkpoints > 0));
   }
 }
 

@@ -126,14 +126,16 @@ TEST_CASE("Features are read as they are unless something in them must be change
 TEST_CASE("What no method reads is not copied") {
   const Estimates all = makeCase(sized(8, 6)).estimates;
   SanitiseReport report;
-  const Estimates few = normalised(all, 1, report, {false, false, true, false});
+  const Estimates few = normalised(all, 1, report, {{.features = true}});
   CHECK(few.estimates[0].quarter.empty());
   CHECK(few.history.empty());
   CHECK(identical(few.features->normal.mean, all.features->normal.mean));
   CHECK(few.features->normal.half[0].empty());
   CHECK(few.features->depth.variance.empty());
-  CHECK_FALSE(normalised(all, 1, report, {true, true, false, true}).features);
-  const auto read = [&](const char* method) { return planesRead(makeCombinePlan(availableIn(all), {method}, {})); };
+  CHECK_FALSE(normalised(all, 1, report, {{.featureNoise = true, .quarters = true, .history = true}}).features);
+  const auto read = [&](const char* method) {
+    return planesRead(makeCombinePlan(availableIn(all), {method}, {})).buffers;
+  };
   CHECK(read("nfor").featureNoise);
   CHECK_FALSE(read("nfor").quarters);
   CHECK(read("auto").featureNoise);
@@ -146,14 +148,16 @@ TEST_CASE("What no method reads is not copied") {
   CHECK(read("auto").quarters);  // fused with those of the photon map
   Estimates alone = all;
   alone.estimates.resize(1);
-  CHECK_FALSE(planesRead(makeCombinePlan(availableIn(alone), {"auto"}, {})).quarters);
-  CHECK_FALSE(planesRead(makeCombinePlan(availableIn(alone), {"auto"}, {})).directIndirect);
+  CHECK_FALSE(planesRead(makeCombinePlan(availableIn(alone), {"auto"}, {})).buffers.quarters);
+  CHECK_FALSE(planesRead(makeCombinePlan(availableIn(alone), {"auto"}, {})).buffers.directIndirect);
   Estimate& e = alone.estimates[0];
   e.direct = {e.mean, {e.half[0], e.half[1]}, e.variance};
   e.indirectVariance = e.variance;
-  CHECK(planesRead(makeCombinePlan(availableIn(alone), {"auto"}, {})).directIndirect);
-  CHECK_FALSE(planesRead(makeCombinePlan(availableIn(alone), {"js@pw"}, {})).directIndirect);
-  CHECK(normalised(alone, 1, report, {true, true, true, true, true, false}).estimates[0].direct.mean.empty());
+  CHECK(planesRead(makeCombinePlan(availableIn(alone), {"auto"}, {})).buffers.directIndirect);
+  CHECK_FALSE(planesRead(makeCombinePlan(availableIn(alone), {"js@pw"}, {})).buffers.directIndirect);
+  CHECK(normalised(alone, 1, report, {{.features = true, .featureNoise = true, .quarters = true, .history = true}})
+            .estimates[0]
+            .direct.mean.empty());
   const Estimate doubled = normalised(alone, 2, report).estimates[0];
   CHECK(doubled.direct.half[1][0][5] == 2 * e.half[1][0][5]);
   CHECK(doubled.indirectVariance[2][7] == 4 * e.variance[2][7]);

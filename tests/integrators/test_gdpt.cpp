@@ -220,7 +220,7 @@ class SurfaceCounts : public PathObserver {
 void checkBasePath(const std::string& name, const Scene& scene) {
   Settings settings = settingsOf("gdpt", 24, 16, 1);
   settings.maxDepth = GradientKernel::kRouletteStart;
-  settings.features = true;
+  settings.keep.features = true;
   const Plan plan = makePlan(scene, scene.data().cameras.at(0), settings, integrators());
   const TransportContext context(scene, settings.lightStrategy);
   CAPTURE(name);

@@ -223,12 +223,12 @@ TEST_CASE("Names, options and what is kept decide about the steps") {
   options.denoisers = {"nlm"};
   CHECK(steps({"curves:64"}) == "nlm; nlm-stop64; curves:64 of nlm-stop64; ");
 
-  const CombinePlanNeeds needs =
-      needsOf(makeCombinePlan(available, {"curves:512@box", "curves@box", "curves:512@nlm"}, options));
-  CHECK(needs.stops == std::vector<uint64_t>{50, 512});
-  CHECK(needs.checkpoints == 2);
+  const KeptBuffers buffers =
+      buffersOf(makeCombinePlan(available, {"curves:512@box", "curves@box", "curves:512@nlm"}, options));
+  CHECK(buffers.stops == std::vector<uint64_t>{50, 512});
+  CHECK(buffers.history);
   options.stop = 0;
-  CHECK(needsOf(makeCombinePlan(available, {"curves@box", "easy@box"}, options)).stops.empty());
+  CHECK(buffersOf(makeCombinePlan(available, {"curves@box", "easy@box"}, options)).stops.empty());
   for (const char* wrong : {"curves:", "curves:0", "curves:-1", "curves:many", "curves:64x", "easy:64"})
     CHECK_THROWS_AS(makeCombinePlan(available, {wrong}, options), Error);
   CHECK(stopPasses(0) == 0);

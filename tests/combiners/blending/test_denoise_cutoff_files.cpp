@@ -27,8 +27,7 @@ const Scene& cornell() {
 Settings stoppingSettings(uint64_t spp) {
   Settings s = test::settingsFor(24, 18, spp);
   s.integrators = {"pt"};
-  s.features = s.history = true;
-  s.stops = {7};
+  s.keep = {.features = true, .history = true, .stops = {7}};
   return s;
 }
 
