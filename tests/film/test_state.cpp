@@ -196,7 +196,7 @@ TEST_CASE("States of other renders are refused with a sentence that names what d
   CHECK(contains(changed([](Settings& o) { o.background = Spectrum(1); }), "--background was none and is 1,1,1"));
   CHECK(contains(changed([](Settings& o) { o.clamp = 1; }), "--clamp was 0 and is 1"));
   CHECK(contains(changed([](Settings& o) { o.photons = 7; }), "--photons was 0 and is 7"));
-  CHECK(contains(changed([](Settings& o) { o.quarters = false; }), "keeping quarters was on and is off"));
+  CHECK(contains(changed([](Settings& o) { o.keep.quarters = false; }), "keeping quarters was on and is off"));
   // The scene's bytes.
   SceneData data = cornellBox();
   data.contentHash = 77;

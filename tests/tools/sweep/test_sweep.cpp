@@ -163,11 +163,11 @@ TEST_CASE("A table that is read and written again keeps its bytes") {
 TEST_CASE("A sweep may grow, but rows of other options are refused") {
   const Folder folder;
   SweepOptions o = smallSweep(folder);
-  o.spp = "2";
+  o.spp = parseLadder("2", false);
   o.seeds = 1;
   REQUIRE(sweep(o) == 0);
   SweepOptions more = o;
-  more.spp = "2:4";
+  more.spp = parseLadder("2:4", false);
   more.seeds = 2;
   REQUIRE(sweep(more) == 0);
   CHECK(readSweepTable(o.output + "/sweep.csv").rows.size() == 4);
@@ -187,7 +187,7 @@ TEST_CASE("A sweep may grow, but rows of other options are refused") {
   CHECK(failureOf([&] { sweep(other); }).first == ExitCode::Usage);
   // A better reference changes every error.
   other = more;
-  other.spp = "8";
+  other.spp = parseLadder("8", false);
   other.referenceSpp = 128;
   CHECK(failureOf([&] { sweep(other); }).second.find("another reference of the scene cornell") != std::string::npos);
   std::filesystem::remove(o.output + "/sweep.json");
@@ -199,7 +199,7 @@ TEST_CASE("The ladder of seconds records the true seconds and samples past each 
   const Folder folder;
   SweepOptions o = smallSweep(folder);
   o.spp.clear();
-  o.time = "0.02:0.08";
+  o.time = parseLadder("0.02:0.08", true);
   o.seeds = 1;
   REQUIRE(sweep(o) == 0);
   const SweepTable t = readSweepTable(o.output + "/sweep.csv");
@@ -225,7 +225,7 @@ TEST_CASE("Squared error of path tracing falls as one over the samples") {
   o.scenes = {test::sourcePath("scenes/furnace.glb")};
   o.maxDepth = 8;
   o.metrics = {"relL2"};
-  o.spp = "4:64";
+  o.spp = parseLadder("4:64", false);
   o.seeds = 4;
   o.referenceSpp = 128;
   REQUIRE(sweep(o) == 0);
