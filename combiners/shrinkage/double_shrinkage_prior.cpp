@@ -8,7 +8,7 @@
 #include "combiners/pixels/finite_float.h"
 #include "combiners/regression/regression_features.h"
 #include "combiners/shrinkage/optimised_bias.h"
-#include "combiners/shrinkage/radiance_prior.h"
+#include "combiners/regression/radiance_prior.h"
 #include "combiners/statistics/half_statistics.h"
 #include "combiners/statistics/surface_smooth.h"
 #include "renderer/core/parallel.h"

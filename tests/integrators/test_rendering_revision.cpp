@@ -14,8 +14,8 @@
 
 #include "renderer/session/rendering_revision.h"
 #include "tests/support/render_fixture.h"
-#include "tools/publish/exr_metadata.h"
-#include "tools/publish/prepared_render.h"
+#include "tools/images/exr_metadata.h"
+#include "tools/prepare/prepared_render.h"
 
 namespace braid::test_rendering_revision {
 

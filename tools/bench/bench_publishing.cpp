@@ -13,7 +13,7 @@
 #include "renderer/core/stopwatch.h"
 #include "renderer/session/session.h"
 #include "tools/options/combining.h"
-#include "tools/publish/exr_metadata.h"
+#include "tools/images/exr_metadata.h"
 #include "tools/publish/publisher.h"
 
 namespace braid {

@@ -13,9 +13,9 @@
 #include "tools/bench/builtin_scenes.h"
 #include "tools/options/cli.h"
 #include "tools/options/combining.h"
-#include "tools/options/help.h"
+#include "tools/options/syntax/help.h"
 #include "tools/options/open_scene.h"
-#include "tools/options/option_checks.h"
+#include "tools/options/syntax/option_checks.h"
 #include "version.h"
 
 namespace braid {

@@ -14,7 +14,7 @@
 #include "renderer/film/files/exr.h"
 #include "tools/metrics/identical.h"
 #include "tools/metrics/metrics.h"
-#include "tools/options/option_checks.h"
+#include "tools/options/syntax/option_checks.h"
 
 namespace braid {
 

@@ -8,7 +8,7 @@
 
 #include "renderer/core/hash.h"
 #include "tools/options/cli.h"
-#include "tools/options/help.h"
+#include "tools/options/syntax/help.h"
 #include "tools/options/open_scene.h"
 
 namespace braid {

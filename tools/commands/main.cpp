@@ -13,9 +13,9 @@
 #include "renderer/core/error.h"
 #include "tools/commands/lists.h"
 #include "tools/options/cli.h"
-#include "tools/options/help.h"
+#include "tools/options/syntax/help.h"
 #include "tools/options/memory_limit.h"
-#include "tools/options/old_spellings.h"
+#include "tools/options/syntax/old_spellings.h"
 #include "tools/run/standard_streams.h"
 #include "version.h"
 

@@ -10,10 +10,10 @@
 #include "renderer/film/files/state_file.h"
 #include "tools/options/cli.h"
 #include "tools/options/file_uses.h"
-#include "tools/options/help.h"
-#include "tools/publish/exr_metadata.h"
+#include "tools/options/syntax/help.h"
+#include "tools/images/exr_metadata.h"
 #include "tools/publish/image_output.h"
-#include "tools/options/option_checks.h"
+#include "tools/options/syntax/option_checks.h"
 #include "tools/options/output_options.h"
 
 namespace braid {

@@ -11,13 +11,13 @@
 #include "renderer/core/hash.h"
 #include "renderer/film/files/output_file.h"
 #include "renderer/film/files/picture.h"
-#include "tools/commands/farm_job.h"
+#include "tools/farm/farm_job.h"
 #include "tools/options/cli.h"
-#include "tools/options/help.h"
-#include "tools/options/option_checks.h"
+#include "tools/options/syntax/help.h"
+#include "tools/options/syntax/option_checks.h"
 #include "tools/options/output_options.h"
 #include "tools/publish/image_output.h"
-#include "tools/publish/prepared_render.h"
+#include "tools/prepare/prepared_render.h"
 
 namespace braid {
 

@@ -13,9 +13,9 @@
 #include "renderer/film/files/picture.h"
 #include "tools/options/cli.h"
 #include "tools/options/file_uses.h"
-#include "tools/options/help.h"
+#include "tools/options/syntax/help.h"
 #include "tools/options/open_scene.h"
-#include "tools/options/option_checks.h"
+#include "tools/options/syntax/option_checks.h"
 #include "tools/options/output_options.h"
 
 namespace braid {

@@ -6,8 +6,8 @@
 #include <CLI/CLI.hpp>
 
 #include "tools/options/cli.h"
-#include "tools/options/help.h"
-#include "tools/options/option_checks.h"
+#include "tools/options/syntax/help.h"
+#include "tools/options/syntax/option_checks.h"
 #include "tools/options/scene_options.h"
 #include "tools/sweep/sweep.h"
 #include "tools/sweep/sweep_preset.h"

@@ -3,9 +3,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "tools/options/help.h"
+#include "tools/options/syntax/help.h"
 #include "tools/options/memory_limit.h"
-#include "tools/options/option_checks.h"
+#include "tools/options/syntax/option_checks.h"
 
 namespace braid {
 

@@ -15,9 +15,9 @@
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 #include "renderer/film/error_map.h"
-#include "tools/options/help.h"
-#include "tools/options/option_checks.h"
-#include "tools/options/option_texts.h"
+#include "tools/options/syntax/help.h"
+#include "tools/options/syntax/option_checks.h"
+#include "tools/options/syntax/option_texts.h"
 
 namespace braid {
 

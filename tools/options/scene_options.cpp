@@ -6,8 +6,8 @@
 #include <CLI/CLI.hpp>
 
 #include "renderer/session/pixel_filter.h"
-#include "tools/options/help.h"
-#include "tools/options/option_checks.h"
+#include "tools/options/syntax/help.h"
+#include "tools/options/syntax/option_checks.h"
 
 namespace braid {
 

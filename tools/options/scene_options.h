@@ -8,7 +8,7 @@
 
 #include "renderer/scene/data/gltf.h"
 #include "renderer/session/settings.h"
-#include "tools/options/option_texts.h"
+#include "tools/options/syntax/option_texts.h"
 
 namespace CLI {
 class App;

@@ -7,7 +7,7 @@
 
 #include "renderer/core/parallel.h"
 #include "tools/images/estimates_file.h"
-#include "tools/publish/exr_metadata.h"
+#include "tools/images/exr_metadata.h"
 #include "tools/run/progress_line.h"
 
 namespace braid {

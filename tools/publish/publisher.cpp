@@ -16,7 +16,7 @@
 #include "renderer/film/files/output_file.h"
 #include "renderer/film/files/state_file.h"
 #include "tools/run/alarm.h"
-#include "tools/publish/exr_metadata.h"
+#include "tools/images/exr_metadata.h"
 #include "tools/run/progress_line.h"
 
 namespace braid {

@@ -15,7 +15,7 @@
 #include "tools/run/interrupt.h"
 #include "tools/sweep/sweep_folder.h"
 #include "tools/sweep/sweep_inputs.h"
-#include "tools/sweep/sweep_pipeline.h"
+#include "tools/sweep/methods/sweep_pipeline.h"
 #include "tools/sweep/sweep_progress.h"
 #include "tools/sweep/sweep_run.h"
 #include "tools/sweep/table/sweep_summary.h"

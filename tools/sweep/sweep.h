@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "renderer/core/sampler.h"
-#include "tools/options/option_texts.h"
-#include "tools/sweep/sweep_method.h"
+#include "tools/options/syntax/option_texts.h"
+#include "tools/sweep/methods/sweep_method.h"
 
 namespace braid {
 

@@ -11,7 +11,7 @@
 #include "renderer/core/hash.h"
 #include "renderer/film/files/exr.h"
 #include "renderer/session/rendering_revision.h"
-#include "tools/publish/exr_metadata.h"
+#include "tools/images/exr_metadata.h"
 
 namespace braid {
 

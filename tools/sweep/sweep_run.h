@@ -11,7 +11,7 @@
 
 #include "renderer/session/session.h"
 #include "tools/metrics/metrics.h"
-#include "tools/sweep/sweep_method.h"
+#include "tools/sweep/methods/sweep_method.h"
 #include "tools/sweep/sweep_reference.h"
 #include "tools/sweep/table/sweep_table.h"
 

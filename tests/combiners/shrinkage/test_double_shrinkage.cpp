@@ -9,7 +9,7 @@
 #include "combiners/pipeline/registry.h"
 #include "combiners/shrinkage/double_shrinkage.h"
 #include "combiners/statistics/surface_smooth.h"
-#include "combiners/shrinkage/radiance_prior.h"
+#include "combiners/regression/radiance_prior.h"
 #include "tests/support/combiner_fixture.h"
 
 namespace braid::test_double_shrinkage {

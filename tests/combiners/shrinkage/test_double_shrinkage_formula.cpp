@@ -8,7 +8,7 @@
 
 #include "combiners/regression/colour_weights.h"
 #include "combiners/shrinkage/double_shrinkage.h"
-#include "combiners/shrinkage/radiance_prior.h"
+#include "combiners/regression/radiance_prior.h"
 
 namespace braid::test_double_shrinkage_formula {
 

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "tests/support/command_line.h"
-#include "tools/commands/farm_job.h"
+#include "tools/farm/farm_job.h"
 
 namespace braid::test::farm_jobs {
 

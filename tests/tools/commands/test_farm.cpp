@@ -6,7 +6,7 @@
 
 #include "renderer/film/files/exr.h"
 #include "tests/support/command_line.h"
-#include "tools/commands/farm_job.h"
+#include "tools/farm/farm_job.h"
 #include "tests/tools/commands/farm_jobs.h"
 
 namespace braid::test_farm {

@@ -10,9 +10,9 @@
 #include "combiners/pipeline/registry.h"
 #include "tests/support/command_line.h"
 #include "tools/options/cli.h"
-#include "tools/options/help.h"
-#include "tools/options/old_spellings.h"
-#include "tools/options/option_checks.h"
+#include "tools/options/syntax/help.h"
+#include "tools/options/syntax/old_spellings.h"
+#include "tools/options/syntax/option_checks.h"
 
 namespace braid::test_options {
 
@@ -28,7 +28,7 @@ const std::vector<std::string> kWrong = {
     "5x",  "5 ",  " 5",   "0x10",  "five",   "1,2,3,4,5,6,7", "--5"};
 
 // What options that take no numbers say of themselves. A new option says one of these, or gets a check of
-// tools/options/option_checks.h.
+// tools/options/syntax/option_checks.h.
 const std::set<std::string> kTexts = {"FILE", "FILES", "FOLDER", "NAME", "NAMES", "SET"};
 
 // The command line, parsed anew each time: options keep their values.
@@ -90,8 +90,9 @@ TEST_CASE("Every option of every subcommand refuses what is no number of its ran
       CAPTURE(commandName);
       CAPTURE(name);
       if (!takesNumbers(*option)) {
-        CHECK_MESSAGE(kTexts.count(option->get_type_name()) == 1, name, " of ", command->get_name(),
-                      ": give it a check of tools/options/option_checks.h, or a type_name() that says what text it is");
+        CHECK_MESSAGE(
+            kTexts.count(option->get_type_name()) == 1, name, " of ", command->get_name(),
+            ": give it a check of tools/options/syntax/option_checks.h, or a type_name() that says what text it is");
         ++texts;
         continue;
       }

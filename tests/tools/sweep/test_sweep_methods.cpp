@@ -6,7 +6,7 @@
 #include "tests/support/gltf_fixture.h"
 #include "tests/support/render_fixture.h"
 #include "tools/sweep/sweep.h"
-#include "tools/sweep/sweep_pipeline.h"
+#include "tools/sweep/methods/sweep_pipeline.h"
 #include "tools/sweep/sweep_run.h"
 #include "tools/sweep/table/sweep_table.h"
 #include "tests/tools/sweep/small_sweeps.h"

@@ -16,7 +16,7 @@
 #include "tools/sweep/report/papers.h"
 #include "tools/sweep/sweep.h"
 #include "tools/sweep/table/sweep_error.h"
-#include "tools/sweep/sweep_pipeline.h"
+#include "tools/sweep/methods/sweep_pipeline.h"
 #include "tools/sweep/sweep_preset.h"
 
 namespace braid::test_sweep_papers {

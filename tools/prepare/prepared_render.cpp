@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/publish/prepared_render.h"
+#include "tools/prepare/prepared_render.h"
 
 #include "integrators/registry.h"
-#include "tools/publish/exr_metadata.h"
-#include "tools/publish/scene_identity.h"
+#include "tools/images/exr_metadata.h"
+#include "tools/prepare/scene_identity.h"
 #include "version.h"
 
 namespace braid {

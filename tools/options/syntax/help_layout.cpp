@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/options/help_layout.h"
+#include "tools/options/syntax/help_layout.h"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>

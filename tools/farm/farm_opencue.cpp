@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "renderer/core/error.h"
-#include "tools/commands/farm_words.h"
+#include "tools/farm/farm_words.h"
 
 namespace braid::farm {
 

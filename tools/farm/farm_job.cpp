@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/commands/farm_job.h"
+#include "tools/farm/farm_job.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "renderer/core/error.h"
-#include "tools/commands/farm_words.h"
+#include "tools/farm/farm_words.h"
 
 namespace braid {
 

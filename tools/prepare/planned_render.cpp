@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/publish/planned_render.h"
+#include "tools/prepare/planned_render.h"
 
 #include <fmt/format.h>
 

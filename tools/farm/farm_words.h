@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/commands/farm_job.h"
+#include "tools/farm/farm_job.h"
 
 namespace braid::farm {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "tools/options/combining.h"
-#include "tools/publish/memory_plan.h"
+#include "tools/prepare/memory_plan.h"
 
 namespace braid {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/options/option_checks.h"
+#include "tools/options/syntax/option_checks.h"
 
 #include <charconv>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include <fmt/ranges.h>
 
 #include "renderer/core/error.h"
-#include "tools/options/option_texts.h"
+#include "tools/options/syntax/option_texts.h"
 
 namespace braid {
 

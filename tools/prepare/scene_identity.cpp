@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/publish/scene_identity.h"
+#include "tools/prepare/scene_identity.h"
 
 #include <fmt/format.h>
 

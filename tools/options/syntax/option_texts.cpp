@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/options/option_texts.h"
+#include "tools/options/syntax/option_texts.h"
 
 #include <charconv>
 #include <cmath>

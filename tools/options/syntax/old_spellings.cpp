@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/options/old_spellings.h"
+#include "tools/options/syntax/old_spellings.h"
 
 #include <array>
 #include <string_view>

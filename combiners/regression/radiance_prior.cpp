@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "combiners/shrinkage/radiance_prior.h"
+#include "combiners/regression/radiance_prior.h"
 
 #include "combiners/regression/colour_weights.h"
 

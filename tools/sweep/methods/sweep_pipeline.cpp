@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/sweep/sweep_pipeline.h"
+#include "tools/sweep/methods/sweep_pipeline.h"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/options/help.h"
+#include "tools/options/syntax/help.h"
 
 #include <algorithm>
 
@@ -9,7 +9,7 @@
 
 #include "combiners/pipeline/registry.h"
 #include "renderer/core/error.h"
-#include "tools/options/help_layout.h"
+#include "tools/options/syntax/help_layout.h"
 
 namespace braid {
 

@@ -7,7 +7,7 @@
 
 #include "renderer/session/session.h"
 #include "tools/options/open_scene.h"
-#include "tools/publish/planned_render.h"
+#include "tools/prepare/planned_render.h"
 
 namespace braid {
 

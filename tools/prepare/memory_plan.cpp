@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/publish/memory_plan.h"
+#include "tools/prepare/memory_plan.h"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/sweep/sweep_method.h"
+#include "tools/sweep/methods/sweep_method.h"
 
 #include <algorithm>
 #include <numeric>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/publish/exr_metadata.h"
+#include "tools/images/exr_metadata.h"
 
 #include <fmt/format.h>
 

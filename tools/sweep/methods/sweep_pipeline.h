@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "combiners/method.h"
-#include "tools/sweep/sweep_method.h"
+#include "tools/sweep/methods/sweep_method.h"
 
 namespace braid {
 

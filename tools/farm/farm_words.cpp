@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/commands/farm_words.h"
+#include "tools/farm/farm_words.h"
 
 #include <filesystem>
 
