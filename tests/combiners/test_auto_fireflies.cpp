@@ -7,6 +7,7 @@
 
 #include <doctest/doctest.h>
 
+#include "combiners/pipeline/method_names.h"
 #include "combiners/statistics/fireflies.h"
 #include "combiners/shrinkage/fused_estimate.h"
 #include "combiners/pipeline/pipeline.h"

@@ -192,16 +192,16 @@ TEST_CASE("Direct light is kept for auto without photon maps, on request, and no
     planCombining(choice, 16, plan);
     return plan;
   };
-  CHECK(planned({"pt"}, "auto").directIndirect);
-  CHECK_FALSE(planned({"pt"}, "none").directIndirect);
-  CHECK_FALSE(planned({"pt"}, "js@pw").directIndirect);
-  CHECK_FALSE(planned({"bdpt"}, "auto").directIndirect);
-  CHECK_FALSE(planned({"pt", "sppm"}, "auto").directIndirect);
+  CHECK(planned({"pt"}, "auto").kept.directIndirect);
+  CHECK_FALSE(planned({"pt"}, "none").kept.directIndirect);
+  CHECK_FALSE(planned({"pt"}, "js@pw").kept.directIndirect);
+  CHECK_FALSE(planned({"bdpt"}, "auto").kept.directIndirect);
+  CHECK_FALSE(planned({"pt", "sppm"}, "auto").kept.directIndirect);
   const Plan with = planned({"pt"}, "auto"), without = planned({"pt"}, "ensemble@pw+nlm");
   CHECK(with.text().find("+ direct light by itself: for outputs or combiners") != std::string::npos);
   CHECK(without.text().find("- direct light by itself: no output or combiner reads it") != std::string::npos);
   CHECK(planned({"bdpt"}, "auto").text().find("no integrator tells it from the rest") != std::string::npos);
-  CHECK(with.buckets == 4);
+  CHECK(with.buckets() == 4);
   CHECK(with.filmBytesPerPixel == 120 + 12 + 224 + 144 + 12);  // sums and a pass: whole, features, parts
   // Of two passes the first filter alone is made, of the whole.
   const RenderResult one = render(scene, withParts(2));

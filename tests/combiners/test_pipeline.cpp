@@ -2,6 +2,7 @@
 // The pipeline of denoisers and combiners: roles, order, chains, and the sentences of what cannot run.
 #include <doctest/doctest.h>
 
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/external_method.h"
 #include "combiners/pipeline/pipeline.h"
 #include "combiners/pipeline/registry.h"

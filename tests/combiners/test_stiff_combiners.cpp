@@ -8,6 +8,7 @@
 
 #include <doctest/doctest.h>
 
+#include "combiners/pipeline/method_names.h"
 #include "combiners/shrinkage/debias.h"
 #include "combiners/pipeline/pipeline.h"
 #include "combiners/pipeline/combine_plan.h"

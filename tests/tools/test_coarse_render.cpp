@@ -36,7 +36,7 @@ struct Cornell {
 
 Settings settingsOf(int width, int height) {
   Settings s = test::settingsFor(width, height, 1);
-  s.features = true;
+  s.keep.features = true;
   s.transparent = true;
   return s;
 }
@@ -68,12 +68,12 @@ TEST_CASE("The window of a coarse plan covers that of the full one, and every pi
     for (const PixelWindow& window : {PixelWindow{0, 0, 101, 67}, {13, 7, 14, 8}, {90, 1, 101, 67}}) {
       Settings s = settingsOf(101, 67);
       s.crop = window;
-      s.quarters = s.history = true;
+      s.keep.quarters = s.keep.history = true;
       s.photons = 1000;
       const Plan full = c.plan(s), coarse = coarsePlan(full, c.camera, divisor);
       CHECK(coarse.settings.width == (101 + divisor - 1) / divisor);
       CHECK(coarse.settings.photons == 1000u / static_cast<unsigned>(divisor * divisor));
-      CHECK(coarse.buckets == 2);
+      CHECK(coarse.buckets() == 2);
       Session session(c.scene, coarse);
       session.advance();
       const Estimates e = enlargedEstimates(session.state(), full);

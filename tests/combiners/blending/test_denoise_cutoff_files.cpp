@@ -68,7 +68,7 @@ TEST_CASE("The film keeps the image of the first checkpoint with enough passes; 
   }
   // A run that keeps no image is another one: its state would lack what is to be blended.
   Settings without = stoppingSettings(20);
-  without.stops.clear();
+  without.keep.stops.clear();
   CHECK_THROWS_AS(sessionFor(without).resume(whole, "whole"), Error);
 
   ExrOptions options;

@@ -6,6 +6,7 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include "combiners/shrinkage/shrinkage_errors.h"
 #include "combiners/pipeline/registry.h"
 #include "combiners/shrinkage/double_shrinkage.h"
 #include "combiners/statistics/surface_smooth.h"

@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <doctest/doctest.h>
 
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/combine_plan.h"
 #include "combiners/pipeline/registry.h"
 #include "tests/support/command_line.h"

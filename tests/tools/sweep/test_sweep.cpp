@@ -180,7 +180,7 @@ TEST_CASE("A sweep may grow, but rows of other options are refused") {
                       "/sweep.json: the sweep in this folder was made with maxDepth 5, not 6: its rows cannot be "
                       "compared with new ones; give the same options or another folder (-o)");
   other = o;
-  other.sampler = "sobol";
+  other.sampler = SamplerKind::Sobol;
   CHECK(failureOf([&] { sweep(other); }).first == ExitCode::Usage);
   other = o;
   other.metrics = {"MSE"};

@@ -189,7 +189,7 @@ TEST_CASE("The preset fills in what was not given, and every method of it can ru
   o.spp = parseLadder("4", false);
   applyPreset("papers", {"--spp"}, o);
   CHECK(o.spp == std::vector<double>{4});
-  CHECK(o.size == FrameSize{192, 108});
+  CHECK((o.size == FrameSize{192, 108}));
   CHECK(o.methods == paperMethods());
   const auto integrators = makeIntegrators();
   CHECK(sweepMethods(o.methods, pointersTo(integrators)).size() == o.methods.size());
