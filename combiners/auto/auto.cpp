@@ -67,8 +67,9 @@ MethodMemory Auto::memory(const MemoryCase& of) const {
   const int fused = of.photonMaps > 0 ? 112 : 0, others = of.bases - of.photonMaps;
   if (of.passes > 0 && of.passes < kAutoFewestPasses) return {48 + fused + 36 * others, 36, 2'300'000};
   const int bases = others + 2;
-  const int refilterBytes = 353 + 16 * bases;  // 48 of it a copy without fireflies
-  return {std::max(44 + 88 * bases, refilterBytes) + fused, 44 + 8 * bases};
+  // 48 of refiltering is a copy without fireflies; the maps of a fused image's errors are gone by then.
+  const int combining = 44 + 88 * bases + fused, refiltering = 353 + 16 * bases + (fused > 0 ? 64 : 0);
+  return {std::max(combining, refiltering), 44 + 8 * bases};
 }
 
 // The outside base as a filter of x: a denoiser that has seen the unbiased image alone is run again.

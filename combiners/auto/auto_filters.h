@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The filters that "auto" runs by itself (combiners/auto/auto.md, step 3).
+// The filters that "auto" runs by itself (step 3 of combiners/auto/auto.md).
 #pragma once
 
 #include <atomic>

@@ -153,16 +153,16 @@ TEST_CASE("Pixels are those that were recorded for this rendering revision") {
 }
 
 TEST_CASE("The comparison takes other roundings for the same pixels, and other samples for others") {
-  const Renders pixels{{"a", {1, 2, 3, 0.5, 0.25, 4, 8, 0.1, 0.2, 0.3, 0.4}}};
+  const Renders pixels{{"room a", {1, 2, 3, 0.5, 0.25, 4, 8, 0.1, 0.2, 0.3, 0.4}}};
   Renders rounded = pixels, one = pixels, brighter = pixels, other = pixels;
-  for (double& v : rounded["a"]) v *= 1 + 1e-4;
-  one["a"][5] = 7;
-  for (double& v : brighter["a"]) v *= 1.003;
-  for (size_t i = 3; i < 11; i += 2) other["a"][i] *= 1.2;
+  for (double& v : rounded["room a"]) v *= 1 + 1e-4;
+  one["room a"][5] = 7;
+  for (double& v : brighter["room a"]) v *= 1.003;
+  for (size_t i = 3; i < 11; i += 2) other["room a"][i] *= 1.2;
   CHECK(changed(rounded, pixels).empty());
   CHECK(changed(one, pixels).empty());
-  CHECK(changed(brighter, pixels) == "a");
-  CHECK(changed(other, pixels) == "a");
+  CHECK(changed(brighter, pixels) == "room a");
+  CHECK(changed(other, pixels) == "room a");
   CHECK(changed({{"b", {1, 1, 1, 1}}}, pixels) == "b");
   std::istringstream text(toText(pixels));
   const Record read = readRecord(text);

@@ -170,8 +170,7 @@ constexpr const char* kPlanHints =
     "      make -j2 -f job.mk\n"
     "  braid plan scene.glb -o out.exr --spp 4096 --tasks 16 --format opencue > job.py\n"
     "      SHOW=testing python3 job.py\n"
-    "  braid plan scene.glb -o out.exr --spp 4096 --tasks 16 --format flamenco > braid_out.js\n"
-    "      (a job type for Flamenco Manager's folder scripts; the file says how to submit)";
+    "  braid plan scene.glb -o out.exr --spp 4096 --tasks 16 --format flamenco > braid_out.js";
 
 }  // namespace
 

@@ -118,8 +118,8 @@ TEST_CASE("double-shrinkage: what a photon map does not know of its bias, and it
     s.mean[c][firefly] = 201;
     s.variance[c][firefly] = 200 * 200;
   }
-  CHECK(errorWith("removeFireflies", 1) < squaredError(x.mean, 1));
-  CHECK(errorWith("removeFireflies", 0) > 2 * errorWith("removeFireflies", 1));
+  CHECK(errorWith("remove-fireflies", 1) < squaredError(x.mean, 1));
+  CHECK(errorWith("remove-fireflies", 0) > 2 * errorWith("removeFireflies", 1));
 }
 
 TEST_CASE("double-shrinkage of a photon map with fireflies does not depend on what else is asked for") {

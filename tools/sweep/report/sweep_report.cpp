@@ -139,7 +139,8 @@ std::vector<std::pair<std::string, std::string>> availableIn(const Json& record)
   const auto text = [](const Json& v) {
     if (!v.is_array()) return v.is_string() ? v.get<std::string>() : v.dump();
     std::string list;
-    for (const Json& item : v) list += (list.empty() ? "" : ", ") + item.get<std::string>();
+    for (const Json& item : v)
+      list += (list.empty() ? "" : ", ") + (item.is_string() ? item.get<std::string>() : item.dump());
     return list;
   };
   std::vector<std::pair<std::string, std::string>> available;
