@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // States: a render that is interrupted and resumed, or split into shares and added up, is the render that was neither.
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include "renderer/core/error.h"
 #include "renderer/film/files/state_file.h"
+#include "renderer/session/rendering_revision.h"
 #include "tests/film/state_renders.h"
 #include "tests/support/command_line.h"
 #include "tests/support/contains.h"
@@ -182,6 +184,11 @@ TEST_CASE("States of other renders are refused with a sentence that names what d
   s.maxDepth = 5;
   s.seed = 3;
   CHECK(contains(refused(s), "old.state: cannot be resumed: --seed was 0 and is 3; --max-depth was 32 and is 5"));
+  StateIdentity older = state.identity;
+  for (StateOption& o : older.options)
+    if (o.name == "the rendering revision") o.value = "0";
+  CHECK(difference(older, state.identity, false) ==
+        fmt::format("the rendering revision was 0 and is {}", kRenderingRevision));
   const auto changed = [&](const auto& change) {
     Settings other = everythingKept("pt", 2);
     change(other);

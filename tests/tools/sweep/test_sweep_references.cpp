@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // References of `braid sweep`: those that show something else are refused.
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include "renderer/core/error.h"
 #include "renderer/film/files/exr.h"
+#include "renderer/session/rendering_revision.h"
+#include "tests/support/contains.h"
 #include "tests/support/gltf_fixture.h"
 #include "tests/support/render_fixture.h"
 #include "tools/images/estimates_file.h"
@@ -92,6 +95,41 @@ TEST_CASE("A reference is of one view, of an unbiased estimate and of seeds of i
   CHECK(keptReference(folder.path.string(), frame, "pt", 2));
   CHECK_FALSE(keptReference(folder.path.string(), frame, "pt", 4));
   CHECK_FALSE(keptReference(folder.path.string(), frame, "other", 2));
+}
+
+TEST_CASE("References of another rendering revision are refused, and those that a sweep kept rendered anew") {
+  const Folder folder;
+  const Scene scene(cornellBox());
+  const CameraData camera = scene.data().cameras[0];
+  Settings settings = test::settingsFor(16, 16, 2);
+  settings.integrators = {"pt"};
+  const ReferenceFrame frame = referenceFrame(scene, camera, settings);
+  const auto render = [&] {
+    return renderReference(folder.path.string(), {scene, camera, settings, test::integrators()}, {}, nullptr);
+  };
+  const auto rendered = render();
+  REQUIRE(rendered);
+  const ImageFile file = readImage(rendered->file);
+  Estimates other = readEstimates(file);
+  other.attributes = file.attributes;
+  for (Attribute& a : other.attributes)
+    if (a.name == "braid/renderingRevision") a.integer = kRenderingRevision + 1;
+  ExrOptions exr;
+  exr.floatHeadline = true;
+  writeExr(rendered->file, other, file.rgb(""), nullptr, exr);
+  const std::string revisions = fmt::format("rendered at rendering revision {}, and this braid renders at {}",
+                                            kRenderingRevision + 1, kRenderingRevision);
+  const std::string refusal = failureOf([&] { readReference(rendered->file, frame, "pt", 0, 1); }).second;
+  CHECK(test::contains(refusal, rendered->file));
+  CHECK(test::contains(refusal, revisions));
+  std::string stale;
+  CHECK_FALSE(keptReference(folder.path.string(), frame, "pt", 2, &stale));
+  CHECK(test::contains(stale, rendered->file));
+  CHECK(test::contains(stale, revisions));
+  REQUIRE(render());
+  stale.clear();
+  CHECK(keptReference(folder.path.string(), frame, "pt", 2, &stale));
+  CHECK(stale.empty());
 }
 
 }  // namespace braid::test_sweep_references
