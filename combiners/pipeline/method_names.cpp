@@ -84,7 +84,7 @@ std::string layerName(const std::string& name) {
       hash.add(name);
       file = file.substr(file.find_first_not_of("' "));
       file = file.substr(0, file.find_first_of("' "));
-      more = "-" + hexString(hash.value()).substr(0, 4);
+      more.append("-").append(hexString(hash.value()), 0, 4);
     }
     text.append("-").append(std::filesystem::path(file).stem().string()).append(more);
   }
