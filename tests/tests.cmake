@@ -20,7 +20,7 @@ function(braid_test_program name)
 endfunction()
 set_source_files_properties(tests/main.cpp PROPERTIES SKIP_PRECOMPILE_HEADERS ON)  # it implements doctest
 if(TARGET braid_image_module)
-  set_source_files_properties(tests/tools/test_image_module.cpp PROPERTIES COMPILE_DEFINITIONS BRAID_IMAGE_MODULE="$<TARGET_FILE:braid_image_module>")
+  set_source_files_properties(tests/tools/images/test_image_module.cpp PROPERTIES COMPILE_DEFINITIONS BRAID_IMAGE_MODULE="$<TARGET_FILE:braid_image_module>")
 endif()
 set_source_files_properties(tests/main.cpp tests/support/counted_memory.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 
@@ -55,7 +55,7 @@ foreach(source IN LISTS test_sources)
   endif()
   add_test(NAME ${name} COMMAND ${program} --source-file=*${name}.cpp --minimal ${left_out})
   set_tests_properties(${name} PROPERTIES TIMEOUT 600)
-  if(name MATCHES "^test_(bdpt|registry|registry_images|cli|calibration)$")
+  if(name MATCHES "^test_(bdpt|registry|registry_images|cli|cli_images|calibration)$")
     set_tests_properties(${name} PROPERTIES COST 100)  # the longest ones begin first
   endif()
   if(source IN_LIST loading_sources)

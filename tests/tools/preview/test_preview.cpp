@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `braid preview` by HTTP: what it answers, to whom, how it is stopped; and the board that holds what it shows.
+// `braid preview` by HTTP: what it answers, to whom, and how it is stopped.
 #include <cmath>
-#include <cstring>
-#include <limits>
-#include <optional>
 #include <sstream>
 
 #include <arpa/inet.h>
@@ -13,10 +10,12 @@
 
 #include "renderer/film/files/exr.h"
 #include "tests/support/running_braid.h"
-#include "tools/preview/preview_board.h"
+#include "tests/tools/preview/half_floats.h"
 
 namespace braid::test_preview {
 
+namespace fs = braid::test::fs;
+using namespace test::half_floats;
 using test::braidRun;
 using test::contains;
 using test::Folder;
@@ -24,10 +23,7 @@ using test::Json;
 using test::kCornellFile;
 using test::readText;
 using test::Run;
-using test::sleepFor;
 using test::waitUntil;
-
-namespace fs = braid::test::fs;
 
 namespace {
 
@@ -102,18 +98,6 @@ Answer ask(int port, const std::string& method, const std::string& target, const
 
 Json stateOf(const Preview& p) { return ask(p.port(), "GET", "/state.json").json(); }
 
-// IEEE 754 binary16, little-endian.
-float halfAt(const std::string& bytes, size_t index) {
-  const auto byte = [&](size_t i) { return static_cast<unsigned>(static_cast<unsigned char>(bytes.at(i))); };
-  const unsigned bits = byte(2 * index) | byte(2 * index + 1) << 8;
-  const int exponent = static_cast<int>(bits >> 10 & 31);
-  const auto fraction = static_cast<double>(bits & 1023);
-  const double size = exponent == 31  ? (fraction > 0 ? std::nan("") : std::numeric_limits<double>::infinity())
-                      : exponent == 0 ? std::ldexp(fraction, -24)
-                                      : std::ldexp(1 + fraction / 1024, exponent - 15);
-  return static_cast<float>(bits & 32768 ? -size : size);
-}
-
 // Local addresses, in hexadecimal as the system lists them, that listen at the port.
 std::vector<std::string> listeners(int port) {
   std::vector<std::string> found;
@@ -131,8 +115,6 @@ std::vector<std::string> listeners(int port) {
   }
   return found;
 }
-
-Rgb<float> grey(int width, int height, float value) { return Rgb<float>(width, height, value); }
 
 // What a preview of 48x32 pixels tells while it renders to the file.
 void checkState(const Json& s, const std::string& file) {
@@ -270,84 +252,6 @@ TEST_CASE("A preview ends by its limits and by signals, and saves then") {
   CHECK(run.code == 1);
   CHECK(contains(run.err, "js cannot run"));
   CHECK(contains(braidRun(folder, "preview --help").out, "braid preview scene.glb --tev"));
-}
-
-TEST_CASE("The board's images hold the pixels, whatever the unit of light") {
-  for (const float unit : {1e-12f, 1e-6f, 1.0f, 1e6f, 1e12f}) {
-    INFO(unit);
-    PreviewBoard board("scene", {}, 0);
-    Rgb<float> image(5, 3);
-    for (size_t c = 0; c < 3; ++c)
-      for (size_t i = 0; i < image.size(); ++i) image[c][i] = unit * (0.1f + 0.05f * static_cast<float>(3 * i + c));
-    image[0][4] = std::numeric_limits<float>::quiet_NaN();
-    image[1][5] = 0;
-    board.show(1, 0.5, {&image});
-    const auto shown = board.image("noisy");
-    REQUIRE(shown);
-    REQUIRE(shown->pixels.size() == 5 * 3 * 3 * 2);
-    for (size_t i = 0; i < image.size(); ++i)
-      for (size_t c = 0; c < 3; ++c) {
-        const float value = std::ldexp(halfAt(shown->pixels, 3 * i + c), -shown->exponent);
-        if (std::isnan(image[c][i]))
-          CHECK(std::isnan(value));
-        else
-          CHECK(std::abs(value - image[c][i]) <= std::ldexp(image[c][i], -11));
-      }
-    CHECK(!board.image("combined"));
-    CHECK(!board.image("error"));
-  }
-}
-
-TEST_CASE("Error images are relative, and older images replace no newer ones") {
-  PreviewBoard board("scene", {}, 0);
-  const Rgb<float> image = grey(2, 2, 0.5f);
-  const Plane<float> error(2, 2, 0.26f * 0.04f), half(2, 2, 0.26f * 0.01f);
-  board.show(8, 1, {&image, nullptr, &error, nullptr});
-  CHECK(halfAt(board.image("error")->pixels, 3) == doctest::Approx(0.2).epsilon(1e-3));
-  CHECK(board.state()["estimatedError"]["noisy"].get<double>() == doctest::Approx(0.04));
-  board.show(8, 1, {nullptr, &image, nullptr, &half});
-  CHECK(halfAt(board.image("error")->pixels, 0) == doctest::Approx(0.1).epsilon(1e-3));
-  CHECK(halfAt(board.image("noisy-error")->pixels, 0) == doctest::Approx(0.2).epsilon(1e-3));
-  CHECK(board.state()["estimatedError"]["combined"].get<double>() == doctest::Approx(0.01));
-  const Rgb<float> old = grey(2, 2, 7);
-  board.show(4, 0.5, {&old, &old, &half, &half});
-  CHECK(board.image("noisy")->spp == 8);
-  CHECK(halfAt(board.image("combined")->pixels, 0) == 0.5f);
-  CHECK(board.state()["history"]["noisy"].size() == 1);
-}
-
-TEST_CASE("The history of a long preview stays short and keeps its newest point") {
-  PreviewBoard board("scene", {}, 0);
-  const Rgb<float> image = grey(1, 1, 1);
-  const Plane<float> error(1, 1, 1);
-  uint64_t spp = 0;
-  for (double t = 0.25; t < 20000; t += 1) board.show(++spp, t, {&image, nullptr, &error, nullptr});
-  const Json history = board.state()["history"]["noisy"];
-  CHECK(history.size() < 600);
-  CHECK(history.size() > 100);
-  CHECK(history.back()[1] == spp);
-  for (size_t i = 1; i < history.size(); ++i) CHECK(history[i][0] > history[i - 1][0]);
-}
-
-TEST_CASE("Waiting for a change ends with one, with the time, and when the board closes") {
-  PreviewBoard board("scene", {}, 0);
-  const auto seconds = [&](uint64_t version, double limit) {
-    const auto start = std::chrono::steady_clock::now();
-    board.waitForChange(version, limit);
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  };
-  const uint64_t version = board.state()["version"];
-  CHECK(seconds(version + 1, 10) < 1);
-  CHECK(seconds(version, 0.1) >= 0.09);
-  std::thread later([&] {
-    sleepFor(0.1);
-    board.warn("something");
-  });
-  CHECK(seconds(version, 20) < 10);
-  later.join();
-  CHECK(board.state()["warnings"] == Json::array({"something"}));
-  board.close();
-  CHECK(seconds(board.state()["version"], 20) < 10);
 }
 
 }  // namespace braid::test_preview

@@ -53,6 +53,20 @@ bool takesNumbers(CLI::Option& o) {
   }
 }
 
+void taken(const std::string& option, const std::string& value) {
+  CAPTURE(option);
+  CAPTURE(value);
+  CHECK(complaintOf({"render", option + "=" + value}) == "");
+}
+
+void refused(const std::string& option, const std::string& value, const std::string& range) {
+  CAPTURE(option);
+  CAPTURE(value);
+  const std::string complaint = complaintOf({"render", option + "=" + value});
+  CHECK(contains(complaint, "'" + value + "'"));
+  CHECK(contains(complaint, range));
+}
+
 }  // namespace
 
 TEST_CASE("Every option of every subcommand refuses what is no number of its range, and says the range") {
@@ -98,18 +112,6 @@ TEST_CASE("Every option of every subcommand refuses what is no number of its ran
 }
 
 TEST_CASE("Numbers within their ranges pass, with the ends that belong to them") {
-  const auto taken = [](const std::string& option, const std::string& value) {
-    CAPTURE(option);
-    CAPTURE(value);
-    CHECK(complaintOf({"render", option + "=" + value}) == "");
-  };
-  const auto refused = [](const std::string& option, const std::string& value, const std::string& range) {
-    CAPTURE(option);
-    CAPTURE(value);
-    const std::string complaint = complaintOf({"render", option + "=" + value});
-    CHECK(contains(complaint, "'" + value + "'"));
-    CHECK(contains(complaint, range));
-  };
   taken("--spp", "1");
   taken("--spp", "0016");  // not octal
   refused("--spp", "0", "a whole number from 1 to ");
@@ -132,6 +134,13 @@ TEST_CASE("Numbers within their ranges pass, with the ends that belong to them")
   refused("--clamp", "-1", "from 0");
   refused("--photon-radius", "0", "from 0.01 to 1000");
   refused("--photons", "0", "from 1 to 268435456");
+  taken("--js-constant", "1.25");
+  refused("--js-constant", "-1", "from 0 to 100");
+  refused("--nlm-window", "2.5", "a whole number from 0 to 100");
+  refused("--auto-fuse", "2", "from 0 to 1");
+}
+
+TEST_CASE("Sizes, lists of numbers, durations and addresses are checked part by part") {
   taken("--size", "65536x1");
   for (const char* size : {"0x5", "5x0", "-5x5", "65537x1", "65536x65536", "5", "5x", "x5", "5x5x5", "5.5x5", "5X5"})
     refused("--size", size, "WIDTHxHEIGHT such as 1280x720, from 1 to 65536");
@@ -152,10 +161,6 @@ TEST_CASE("Numbers within their ranges pass, with the ends that belong to them")
   refused("--passes", "5:5", "FIRST:END");
   taken("--memory-limit", "1.5G");
   refused("--memory-limit", "1M", "at least 192 MiB");
-  taken("--js-constant", "1.25");
-  refused("--js-constant", "-1", "from 0 to 100");
-  refused("--nlm-window", "2.5", "a whole number from 0 to 100");
-  refused("--auto-fuse", "2", "from 0 to 1");
 }
 
 TEST_CASE("The program tells a wrong number in one line with exit code 1, before it reads anything") {

@@ -77,6 +77,13 @@ SweepTable threeScenes() {
                   {"hall", "pt+sppm/auto", 16, 1, 0.3}});
 }
 
+std::vector<ReplicateBias> biasesOfTwoScenes() {
+  return {{"room", "uncorrelated", 2, 1e-5, 1e-6, 1e-3},
+          {"room", "nfor", 2, 1e-3, 1e-6, 1e-3},
+          {"pool", "uncorrelated", 2, 1e-2, 1e-1, 1},
+          {"pool", "nfor", 2, 1e-2, 1e-1, 1}};
+}
+
 }  // namespace
 
 TEST_CASE("Cells are ratios of means over seeds, in cells that all methods have") {
@@ -112,10 +119,7 @@ TEST_CASE("Claims hold or not by their cells, and say when nothing was measured"
                                           "ensemble@nfor+rdfc", "ensemble-oracle@nfor+rdfc"});
   CHECK(knowsPapers(summary));
   CHECK(!knowsPapers(summarise(t, {"room"}, {"pt"})));
-  const std::vector<ReplicateBias> biases{{"room", "uncorrelated", 2, 1e-5, 1e-6, 1e-3},
-                                          {"room", "nfor", 2, 1e-3, 1e-6, 1e-3},
-                                          {"pool", "uncorrelated", 2, 1e-2, 1e-1, 1},
-                                          {"pool", "nfor", 2, 1e-2, 1e-1, 1}};
+  const std::vector<ReplicateBias> biases = biasesOfTwoScenes();
   const auto sections = comparePapers(t, summary, biases, {{"room", "pt"}, {"pool", "sppm+bdpt"}, {"hall", "sppm+pt"}});
   REQUIRE(sections.size() == 6);
   const PaperClaim* js = findClaim(sections, "Shrinking towards nfor never");

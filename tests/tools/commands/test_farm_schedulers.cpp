@@ -5,7 +5,7 @@
 
 #include "tests/support/command_line.h"
 #include "tools/commands/farm_job.h"
-#include "tests/tools/farm_jobs.h"
+#include "tests/tools/commands/farm_jobs.h"
 
 namespace braid::test_farm_schedulers {
 

@@ -7,7 +7,7 @@
 #include "renderer/film/files/exr.h"
 #include "tests/support/command_line.h"
 #include "tools/commands/farm_job.h"
-#include "tests/tools/farm_jobs.h"
+#include "tests/tools/commands/farm_jobs.h"
 
 namespace braid::test_farm {
 
