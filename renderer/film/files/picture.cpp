@@ -60,19 +60,21 @@ void write(const std::string& path, ImageFormat format, const ImageHeader& heade
   file.finish();
 }
 
-Attribute text(const char* name, const char* value) { return {name, Attribute::Kind::String, value, 0, 0, {}}; }
+Attribute textAttribute(const char* name, const char* value) {
+  return {name, Attribute::Kind::String, value, 0, 0, {}};
+}
 Attribute number(const char* name, int value) { return {name, Attribute::Kind::Int, "", value, 0, {}}; }
 
 std::vector<Attribute> attributesOf(ImageFormat format, bool alpha) {
   const bool forEyes = format == ImageFormat::Png || format == ImageFormat::Jpeg;
-  std::vector<Attribute> list{text("oiio:ColorSpace", forEyes ? "sRGB" : "Linear")};
+  std::vector<Attribute> list{textAttribute("oiio:ColorSpace", forEyes ? "sRGB" : "Linear")};
   // OpenImageIO adds the date of writing when there is none; files must reproduce byte for byte.
-  list.push_back(text("DateTime", ""));
+  list.push_back(textAttribute("DateTime", ""));
   if (alpha) list.push_back(number("oiio:UnassociatedAlpha", 1));
   // Half the time of the usual level 6, for a hundredth more bytes.
   if (format == ImageFormat::Png) list.push_back(number("png:compressionLevel", 4));
   if (format == ImageFormat::Jpeg) list.push_back(number("CompressionQuality", 95));
-  if (format == ImageFormat::Tiff) list.push_back(text("compression", "zip"));
+  if (format == ImageFormat::Tiff) list.push_back(textAttribute("compression", "zip"));
   return list;
 }
 
