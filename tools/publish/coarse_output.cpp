@@ -22,9 +22,9 @@ constexpr double kLeastPixels = 128 * 128;
 std::string lateText(const TimeLimit& limit, const Plan& plan, const FilmState& coarse, bool combines) {
   return fmt::format(
       "--time {}: one pass over all pixels takes longer: {}x{} were rendered in the place of {}x{}, and each stands "
-      "for several; the image has no variances{}: give more time or a smaller --size",
+      "for several; the image {}has no variances: give more time or a smaller --size",
       formatSeconds(limit.seconds()), coarse.fullWidth, coarse.fullHeight, plan.settings.width, plan.settings.height,
-      combines ? " and is not combined" : "");
+      combines ? "is not combined and " : "");
 }
 
 }  // namespace

@@ -258,7 +258,7 @@ TEST_CASE("A limit of time holds for the whole process, and what it leaves no ti
   const auto end = [&] { return records(folder.path / "log").back(); };
   Run run = braidRun(folder, common + "--size 640x360 --time 1 --combine nfor");
   CHECK(run.code == 0);
-  CHECK(contains(run.err, "is not combined"));
+  CHECK(contains(run.err, "the image is not combined"));
   CHECK(readImage(folder.path / "o.exr").planes.count("combined.nfor.R") == 0);
   CHECK(end()["spp"].get<int>() >= 1);
   // A state holds whole passes.
