@@ -72,7 +72,7 @@ MethodMemory Auto::memory(const MemoryCase& of) const {
   return {std::max(combining, refiltering), 44 + 8 * bases};
 }
 
-// The outside base as a filter of x: a denoiser that has seen the unbiased image alone is run again.
+// The external base as a filter of x: a denoiser that has seen the unbiased image alone is run again.
 Estimate baseOf(const Estimate& base, const Estimate& x, bool fused, const MethodInputs& in) {
   if (!fused || !isMethod(base.name)) return base;
   const std::shared_ptr<const Method> method = findMethod(base.name);
@@ -269,7 +269,7 @@ void AutoRun::combine() {
   std::vector<Plane<float>> maps = channelMeans(weights);
   for (size_t b = 0; b < candidates.size(); ++b)
     result_.aovs.push_back({"weight.auto." + layerName(candidates[b]->name), std::move(maps[b])});
-  shrunk_.clear();  // their memory is what the second pass and the error map need
+  shrunk_.clear();  // their memory is what refiltering and the error map need
   filters_.clear();
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "renderer/core/parallel.h"
+#include "renderer/film/planes.h"
 #include "tools/run/alarm.h"
 
 namespace braid {
@@ -85,10 +86,9 @@ Estimates enlargedEstimates(const FilmState& coarse, const Plan& plan) {
   to.estimates.push_back(std::move(e));
   if (!from.features) return to;
   to.features.emplace();
-  to.features->albedo.mean = enlarged(from.features->albedo.mean);
-  to.features->normal.mean = enlarged(from.features->normal.mean);
-  to.features->depth.mean = enlarged(from.features->depth.mean);
-  to.features->visibility.mean = enlarged(from.features->visibility.mean);
+  for (size_t f = 0; f < kFeaturePlanes.size(); ++f)
+    for (size_t c = 0; kFeaturePlanes[f].components[c] != 0; ++c)
+      featurePlane(*to.features, f, 0, c) = enlarged(featurePlane(std::as_const(*from.features), f, 0, c));
   return to;
 }
 
