@@ -34,4 +34,28 @@ Spectrum unlitColor(const Scene& scene, const SubpathVertex& vertex, bool record
   return color;
 }
 
+std::optional<LightHit> lightAt(const Scene& scene, const Hit& hit) {
+  const int64_t emitter = scene.emitterIndex(hit.meshIndex, hit.triangle, hit.instance);
+  const float cosine = glm::dot(hit.wo, hit.ng);
+  if (emitter < 0 || !(cosine > 0)) return std::nullopt;
+  return LightHit{static_cast<uint32_t>(emitter), cosine};
+}
+
+Spectrum radianceBeyond(const Scene& scene, const Plan& plan, const Vec3& direction, bool fromCamera, bool record,
+                        PathSample& sample) {
+  if (fromCamera) sample.coverage = 0;
+  Spectrum radiance(0);
+  if (fromCamera && plan.settings.background) {
+    radiance = *plan.settings.background;
+  } else if (scene.environment()) {
+    radiance = scene.environment()->radiance(direction);
+  }
+  if (plan.kept.features && record) {
+    sample.features.setAlbedo(radiance);
+    sample.features.normal = -direction;
+    sample.features.depth = 0;
+  }
+  return fromCamera && plan.settings.transparent ? Spectrum(0) : radiance;
+}
+
 }  // namespace braid

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// What integrators with camera subpaths do alike: the ray through a pixel, and the features of what it sees.
+// What integrators with camera subpaths do alike: the ray through a pixel, the features of what it sees, and the lights
+// that it hits.
 #pragma once
 
+#include <optional>
+
+#include "integrators/path_sample.h"
 #include "renderer/session/plan.h"
 #include "renderer/transport/subpath.h"
 
@@ -16,5 +20,16 @@ bool recordFeatures(const Scene& scene, const SubpathVertex& vertex, int maxDept
 
 // Records an unlit surface and returns its colour, which only the camera and mirrors see.
 Spectrum unlitColor(const Scene& scene, const SubpathVertex& vertex, bool record, FeatureSample& features);
+
+// A light of LightSampler that a path hits, so that light sampling may have found it as well.
+struct LightHit {
+  uint32_t light;
+  float cosine;  // at the light
+};
+std::optional<LightHit> lightAt(const Scene& scene, const Hit& hit);
+
+// What a ray that leaves the scene brings into the sample of its path. `record`: it has seen nothing to record before.
+Spectrum radianceBeyond(const Scene& scene, const Plan& plan, const Vec3& direction, bool fromCamera, bool record,
+                        PathSample& sample);
 
 }  // namespace braid

@@ -26,20 +26,9 @@ void PathKernel::add(const Spectrum& radiance, bool direct, PathSample& sample) 
 }
 
 void PathKernel::addEnvironment(const PathState& path, PathSample& sample) const {
-  const bool fromCamera = path.fromCamera();
-  if (fromCamera) sample.coverage = 0;
-  Spectrum radiance(0);
-  if (fromCamera && plan_.settings.background) {
-    radiance = *plan_.settings.background;
-  } else if (scene_.environment()) {
-    radiance = scene_.environment()->radiance(path.direction);
-  }
-  if (wantFeatures_ && !path.featuresDone) {
-    sample.features.setAlbedo(radiance);
-    sample.features.normal = -path.direction;
-    sample.features.depth = 0;
-  }
-  if (fromCamera && plan_.settings.transparent) return;
+  const Spectrum radiance =
+      radianceBeyond(scene_, plan_, path.direction, path.fromCamera(), !path.featuresDone, sample);
+  if (isBlack(radiance)) return;
   float weight = 1;
   if (!path.lightCouldNotBeSampled)
     weight = powerHeuristic(path.lastPdfW, context_.lights.pdfEnvironment(path.direction));
@@ -47,21 +36,14 @@ void PathKernel::addEnvironment(const PathState& path, PathSample& sample) const
 }
 
 void PathKernel::addEmission(const PathState& path, const Hit& hit, PathSample& sample) const {
-  const Material& material = *hit.material;
-  if (!hit.front && !material.doubleSided) return;
-  const Spectrum radiance = scene_.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
+  const Spectrum radiance = emissionAt(scene_, hit);
   if (isBlack(radiance)) return;
   float weight = 1;
-  if (!path.lightCouldNotBeSampled) {
-    const int64_t emitter = scene_.emitterIndex(hit.meshIndex, hit.triangle, hit.instance);
-    const float cosLight = glm::dot(hit.wo, hit.ng);
-    if (emitter >= 0 && cosLight > 0) {
-      const float distance = glm::length(hit.position - path.lastPosition);
-      weight = powerHeuristic(path.lastPdfW,
-                              context_.lights.pdfEmitter(path.lastPosition, path.lastNormal, path.lastTwoSided,
-                                                         static_cast<size_t>(emitter), distance, cosLight));
-    }
-  }
+  const auto found = path.lightCouldNotBeSampled ? std::nullopt : lightAt(scene_, hit);
+  if (found)
+    weight = powerHeuristic(
+        path.lastPdfW, context_.lights.pdfEmitter(path.lastPosition, path.lastNormal, path.lastTwoSided, found->light,
+                                                  glm::length(hit.position - path.lastPosition), found->cosine));
   add(path.throughput * radiance * weight, path.bounces <= 1, sample);
 }
 
@@ -313,7 +295,7 @@ bool PathKernel::shade(PathState& path, const Hit& hit, const SampleBlock& block
   if (firstNonSpecular) recordFeatures(path, hit, bsdf, sample);
   if (path.segments >= plan_.settings.maxDepth) return passPane(path, hit, bsdf.straightTransmittance());
 
-  const bool twoSided = (lobes & (kLobeTransmission | kLobeDiffuseTransmission)) != 0;
+  const bool twoSided = (lobes & kTransmittingLobes) != 0;
   if (bsdf.hasNonDelta()) {
     hasShadow = sampleLight(path, hit, bsdf, twoSided, block, shadow);
     shadow.forFeatures = firstNonSpecular && path.featuresDone;

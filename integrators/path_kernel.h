@@ -8,19 +8,12 @@
 // integrators follow the same conventions for hits, media, null interfaces, panes and termination.
 #pragma once
 
+#include "integrators/path_sample.h"
 #include "integrators/path_state.h"
 #include "renderer/session/integrator.h"
 #include "renderer/transport/visibility.h"
 
 namespace braid {
-
-// What one camera path returns.
-struct PathSample {
-  Spectrum radiance{0};
-  Spectrum direct{0};  // the direct part of it
-  float coverage = 1;  // 0 when the camera ray misses everything
-  FeatureSample features;
-};
 
 // Light found at a vertex, not yet known to be visible.
 struct ShadowRay {

@@ -26,6 +26,7 @@ struct Pass {
         lights{preparation->emission, lightSampler,
                static_cast<double>(r.plan.window.width()) * static_cast<double>(r.plan.window.height())},
         cameraMedia(mediaOfCamera(r.context.scene, r.plan.camera)) {}
+  BidirectionalPass shared() const { return {lights, eyeSampler, cameraMedia}; }
 };
 
 class BidirectionalPathTracer final : public Integrator {
@@ -54,7 +55,7 @@ bool renderBidirectionalPass(const PassRequest& request, PassTarget& target, Str
   const Pass pass(request);
   target.setSplatFractionBits(pass.preparation->splatFractionBits);
   return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>*) {
-    BidirectionalKernel kernel(request, pass.lights, pass.eyeSampler, pass.cameraMedia, target, observer);
+    BidirectionalKernel kernel(request, pass.shared(), target, observer);
     renderTile(kernel, tile);
     return TileCounts{pixelCount(tile), kernel.rayCount(), kernel.shadowRayCount()};
   });
@@ -64,7 +65,7 @@ void replayBidirectionalPixel(const PassRequest& request, int x, int y, Strategy
   const Pass pass(request);
   const PixelWindow& w = request.plan.window;
   PassTarget target(w.width(), w.height(), true, request.plan.kept.features, request.plan.settings.transparent);
-  BidirectionalKernel(request, pass.lights, pass.eyeSampler, pass.cameraMedia, target, &observer).render({{x, y}});
+  BidirectionalKernel(request, pass.shared(), target, &observer).render({{x, y}});
 }
 
 std::unique_ptr<Integrator> make_bdpt() { return std::make_unique<BidirectionalPathTracer>(); }

@@ -45,6 +45,14 @@ struct Merging {
   float normalization = 0;                    // 1 / (π r² · light subpaths)
 };
 
+// What the kernels of a pass share. Merging may be null.
+struct BidirectionalPass {
+  const LightPaths& lights;
+  const PassSampler& eyeSampler;
+  const MediaStack& cameraMedia;
+  const Merging* merging = nullptr;
+};
+
 // The walks of a plan's subpaths; merging may be null.
 WalkSettings bidirectionalWalk(const Plan& plan, Transport transport, const Merging* merging);
 
@@ -79,9 +87,8 @@ class ConnectionQueue {
 
 class BidirectionalKernel {
  public:
-  BidirectionalKernel(const PassRequest& request, const LightPaths& lights, const PassSampler& eyeSampler,
-                      const MediaStack& cameraMedia, PassTarget& target, StrategyObserver* observer = nullptr,
-                      const Merging* merging = nullptr);
+  BidirectionalKernel(const PassRequest& request, const BidirectionalPass& pass, PassTarget& target,
+                      StrategyObserver* observer = nullptr);
 
   // Renders up to kBatch pixels (full-frame coordinates) and stores their samples; splats go anywhere.
   void render(const std::vector<std::pair<int, int>>& pixels);

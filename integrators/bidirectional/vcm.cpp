@@ -94,7 +94,7 @@ class VertexConnectionAndMerging final : public Integrator {
     merging.grid = &grid;
     const MediaStack cameraMedia = mediaOfCamera(request.context.scene, plan.camera);
     return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>*) {
-      BidirectionalKernel kernel(request, lights, eyeSampler, cameraMedia, target, nullptr, &merging);
+      BidirectionalKernel kernel(request, {lights, eyeSampler, cameraMedia, &merging}, target);
       renderTile(kernel, tile);
       return TileCounts{pixelCount(tile), kernel.rayCount(), kernel.shadowRayCount()};
     });

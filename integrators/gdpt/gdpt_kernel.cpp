@@ -19,7 +19,7 @@ constexpr float kMinSurvival = 0.05f;
 
 bool roughSurface(const SurfaceParameters& s) {
   if (s.lobes == kLobeDiffuse) return true;
-  if (s.lobes & (kLobeTransmission | kLobeDiffuseTransmission)) return false;
+  if (s.lobes & kTransmittingLobes) return false;
   const bool coat = (s.lobes & kLobeClearcoat) != 0 && s.clearcoat > 0;
   return s.roughness >= kRough && (!coat || s.clearcoatRoughness >= kRough);
 }
@@ -30,9 +30,7 @@ float GradientKernel::survival(const Spectrum& weight, float etaRatio) {
   return std::clamp(maxComponent(weight) / etaRatio, kMinSurvival, 1.0f);
 }
 
-bool GradientKernel::transmits(const SurfaceParameters& s) {
-  return (s.lobes & (kLobeTransmission | kLobeDiffuseTransmission)) != 0;
-}
+bool GradientKernel::transmits(const SurfaceParameters& s) { return (s.lobes & kTransmittingLobes) != 0; }
 
 Bsdf GradientKernel::bsdfOf(const SurfaceParameters& s, const Hit& hit) {
   const Vec3 wo = hit.frame.toLocal(hit.wo);

@@ -131,21 +131,17 @@ void PhotonEyeBatch::addUnlit(int index, const SubpathState& state, const Subpat
 
 void PhotonEyeBatch::addEmission(int index, const SubpathState& state, const SubpathVertex& vertex) {
   const Hit& hit = vertex.hit;
-  if (!hit.front && !hit.material->doubleSided) return;
-  const Spectrum radiance = scene_.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
+  const Spectrum radiance = emissionAt(scene_, hit);
   if (isBlack(radiance)) return;
   float weight = 1;
-  const int64_t emitter = scene_.emitterIndex(hit.meshIndex, hit.triangle, hit.instance);
-  const float cosLight = glm::dot(hit.wo, hit.ng);
-  if (emitter >= 0 && cosLight > 0) {
-    const auto light = static_cast<uint32_t>(emitter);
+  if (const auto found = lightAt(scene_, hit)) {
     if (state.lightCouldNotBeSampled)
-      weight = causticHitWeight(index, state, light, hit.wo, cosLight);
+      weight = causticHitWeight(index, state, found->light, hit.wo, found->cosine);
     else
-      weight =
-          powerHeuristic(path_[static_cast<size_t>(index)].choice * state.lastPdfW,
-                         context_.lights.pdfEmitter(state.lastPosition, state.lastNormal, state.lastTwoSided, light,
-                                                    glm::length(hit.position - state.lastPosition), cosLight));
+      weight = powerHeuristic(
+          path_[static_cast<size_t>(index)].choice * state.lastPdfW,
+          context_.lights.pdfEmitter(state.lastPosition, state.lastNormal, state.lastTwoSided, found->light,
+                                     glm::length(hit.position - state.lastPosition), found->cosine));
   }
   sample_[static_cast<size_t>(index)].radiance += vertex.throughput * radiance * weight;
 }
@@ -154,20 +150,9 @@ void PhotonEyeBatch::addEnvironment(int index, const SubpathState& state) {
   PathSample& sample = sample_[static_cast<size_t>(index)];
   Path& path = path_[static_cast<size_t>(index)];
   path.arrive(state);
-  const bool fromCamera = state.fromCamera();
-  if (fromCamera) sample.coverage = 0;
-  Spectrum radiance(0);
-  if (fromCamera && plan_.settings.background) {
-    radiance = *plan_.settings.background;
-  } else if (scene_.environment()) {
-    radiance = scene_.environment()->radiance(state.direction);
-  }
-  if (plan_.kept.features && !path.featuresDone) {
-    sample.features.setAlbedo(radiance);
-    sample.features.normal = -state.direction;
-    sample.features.depth = 0;
-  }
-  if ((fromCamera && plan_.settings.transparent) || isBlack(radiance)) return;
+  const Spectrum radiance =
+      radianceBeyond(scene_, plan_, state.direction, state.fromCamera(), !path.featuresDone, sample);
+  if (isBlack(radiance)) return;
   float weight = 1;
   if (state.lightCouldNotBeSampled)
     weight = causticHitWeight(index, state, context_.lights.environmentLight(), -state.direction, 1);

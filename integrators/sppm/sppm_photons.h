@@ -26,7 +26,7 @@ inline int firstPhotonSegment(const Settings& settings) { return settings.photon
 
 // Whether caustics in the reflections of narrow lobes are found by photons, too; see CausticMerging.
 inline bool mergesCaustics(const Scene& scene, int maxDepth) {
-  return maxDepth > 2 && scene.traits().has(kTraitSpecular | kTraitTransmission | kTraitClearcoat);
+  return maxDepth > 2 && scene.traits().hasLobe(kLobeSpecular | kLobeTransmission | kLobeClearcoat);
 }
 
 // Follows the light subpaths [begin, end); onVertex(item, vertex) is called wherever one arrives, for gathering or

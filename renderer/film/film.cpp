@@ -19,10 +19,6 @@ namespace {
 // variance ratio).
 constexpr int kVarianceBoxRadius = 4;
 
-bool acceptable(const Spectrum& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z) && !(v.x < 0 || v.y < 0 || v.z < 0);
-}
-
 void commitRow(const float* __restrict own, double* __restrict sum, double* __restrict sumsq, size_t width) {
   for (size_t x = 0; x < width; ++x) {
     const double v = static_cast<double>(own[x]);
@@ -46,95 +42,6 @@ void commitRow(const float* __restrict own, const int64_t* __restrict splats, do
 }
 
 }  // namespace
-
-PassTarget::PassTarget(int width, int height, bool splats, bool features, bool coverage, bool bias, bool direct)
-    : width_(width), height_(height), own_(width, height) {
-  if (splats) splats_.assign(3 * own_.size(), 0);
-  if (features) features_.assign(FeatureSample::kComponents, Plane<float>(width, height));
-  if (coverage) coverage_ = Plane<float>(width, height);
-  if (bias) bias_ = Rgb<float>(width, height);
-  if (direct) direct_ = Rgb<float>(width, height);
-}
-
-bool PassTarget::add(int x, int y, const Spectrum& value) {
-  const size_t i = own_[0].index(x, y);
-  const bool ok = acceptable(value);
-  own_.set(i, ok ? value : Spectrum(0));
-  if (!ok) rejected_.fetch_add(1, std::memory_order_relaxed);
-  return ok;
-}
-
-bool PassTarget::addSigned(int x, int y, const Spectrum& value) {
-  const bool ok = isFinite(value);
-  own_.set(own_[0].index(x, y), ok ? value : Spectrum(0));
-  if (!ok) rejected_.fetch_add(1, std::memory_order_relaxed);
-  return ok;
-}
-
-bool PassTarget::splat(int x, int y, const Spectrum& value) {
-  BRAID_ASSERT(!splats_.empty() && x >= 0 && y >= 0 && x < width_ && y < height_);
-  if (!acceptable(value)) {
-    rejected_.fetch_add(1, std::memory_order_relaxed);
-    return false;
-  }
-  int64_t* pixel = &splats_[3 * own_[0].index(x, y)];
-  bool clamped = false;
-  for (int c = 0; c < 3; ++c) {
-    const double v = static_cast<double>(value[c]);
-    if (v == 0) continue;
-    clamped |= v > splatClamp_;
-    const auto fixed = static_cast<int64_t>(std::llrint(std::min(v, splatClamp_) * splatScale_));
-    std::atomic_ref<int64_t>(pixel[c]).fetch_add(fixed, std::memory_order_relaxed);
-  }
-  if (clamped) clampedSplats_.fetch_add(1, std::memory_order_relaxed);
-  return true;
-}
-
-void PassTarget::setSplatFractionBits(int bits) {
-  splatScale_ = std::ldexp(1.0, bits);
-  splatClamp_ = std::ldexp(1.0, 54 - bits);
-}
-
-void PassTarget::features(int x, int y, const FeatureSample& sample) {
-  const size_t i = own_[0].index(x, y);
-  const float values[FeatureSample::kComponents] = {sample.albedo.x, sample.albedo.y,  sample.albedo.z,
-                                                    sample.normal.x, sample.normal.y,  sample.normal.z,
-                                                    sample.depth,    sample.visibility};
-  // A non-finite component would poison every window around it: it counts as 0, and the sample as rejected.
-  bool ok = true;
-  for (size_t c = 0; c < FeatureSample::kComponents; ++c) {
-    const bool finite = std::isfinite(values[c]);
-    ok &= finite;
-    features_[c][i] = finite ? values[c] : 0.0f;
-  }
-  if (!ok) rejected_.fetch_add(1, std::memory_order_relaxed);
-}
-
-void PassTarget::bias(int x, int y, const Spectrum& value) {
-  const bool ok = isFinite(value);
-  bias_.set(own_[0].index(x, y), ok ? value : Spectrum(0));
-  if (!ok) rejected_.fetch_add(1, std::memory_order_relaxed);
-}
-
-void PassTarget::direct(int x, int y, const Spectrum& value) {
-  direct_.set(own_[0].index(x, y), acceptable(value) ? value : Spectrum(0));
-}
-
-void PassTarget::clear() {
-  const auto width = static_cast<size_t>(width_);
-  parallelRows(height_, [&](int y) {
-    const size_t begin = static_cast<size_t>(y) * width;
-    for (size_t c = 0; c < 3; ++c) std::fill_n(own_[c].data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
-    for (Plane<float>& f : features_) std::fill_n(f.data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
-    for (Rgb<float>* image : {&bias_, &direct_})
-      for (Plane<float>& p : image->channel)
-        if (!p.empty()) std::fill_n(p.data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
-    if (!coverage_.empty()) std::fill_n(coverage_.data.begin() + static_cast<std::ptrdiff_t>(begin), width, 0.0f);
-    if (!splats_.empty()) std::fill_n(splats_.begin() + static_cast<std::ptrdiff_t>(3 * begin), 3 * width, int64_t(0));
-  });
-  rejected_ = 0;
-  clampedSplats_ = 0;
-}
 
 Accumulator::Accumulator(int width, int height, int buckets, bool bias)
     : width_(width),

@@ -63,6 +63,11 @@ bool anyCell(const Plane& plane, const Found& found) {
   }
 }
 
+}  // namespace
+
+// Named, because a class that others may see holds them.
+namespace coincident {
+
 // A set of keys that may claim to hold others, one in a hundred.
 class KeyFilter {
  public:
@@ -101,6 +106,10 @@ class KeySet {
   std::optional<KeyFilter> filter_;
 };
 
+}  // namespace coincident
+
+namespace {
+
 // Unit normal on the front of a triangle; 0 if it has no area.
 glm::dvec3 normalOf(const Vec3* p, bool mirrored) {
   const glm::dvec3 n = glm::cross(glm::dvec3(p[1]) - glm::dvec3(p[0]), glm::dvec3(p[2]) - glm::dvec3(p[0]));
@@ -138,68 +147,102 @@ CoincidentFaces::CoincidentFaces(const AccelInput& input, const std::vector<uint
   look(world);
 }
 
-void CoincidentFaces::look(const std::vector<Placed>& placed) {
-  uint64_t candidates = 0;
-  float largest = 0;
-  for (const Placed& p : placed) {
-    if (!opaque_[p.mesh]) continue;
-    if (reachable_[p.mesh]) candidates += meshes_[p.mesh].triangles.size();
-    for (const Vec3& v : meshes_[p.mesh].positions)
-      largest = std::max(largest,
-                         largestOf(p.instance == kNoInstance ? v : Vec3(instances_[p.instance].toWorld * Vec4(v, 1))));
-  }
-  if (candidates == 0 || !(largest > 0)) return;
-
-  // Of all opaque triangles; not a number where one has no area.
-  std::vector<std::vector<Plane>> planes(placed.size());
-  for (size_t i = 0; i < placed.size(); ++i) {
-    if (!opaque_[placed[i].mesh]) continue;
-    planes[i].resize(meshes_[placed[i].mesh].triangles.size());
-    parallelChunks(planes[i].size(), 4096, [&](size_t begin, size_t end) {
-      for (size_t t = begin; t < end; ++t) {
-        const Triangle triangle = triangleOf(placed[i].mesh, static_cast<uint32_t>(t), placed[i].instance);
-        planes[i][t] = planeOf(triangle.p, triangle.mirrored, largest);
+// The planes of all opaque triangles, and the steps by which those are found that have another one behind them.
+class CoincidentFaces::Search {
+ public:
+  Search(CoincidentFaces& faces, const std::vector<Placed>& placed) : faces_(faces), placed_(placed) {
+    for (const Placed& p : placed_) {
+      if (!faces_.opaque_[p.mesh]) continue;
+      if (faces_.reachable_[p.mesh]) candidates_ += faces_.meshes_[p.mesh].triangles.size();
+      for (const Vec3& v : faces_.meshes_[p.mesh].positions) {
+        const Mat4* toWorld = p.instance == kNoInstance ? nullptr : &faces_.instances_[p.instance].toWorld;
+        largest_ = std::max(largest_, largestOf(toWorld ? Vec3(*toWorld * Vec4(v, 1)) : v));
       }
-    });
+    }
   }
-  const auto forEach = [&](size_t i, const auto& visit) {
-    parallelChunks(planes[i].size(), 4096, [&](size_t begin, size_t end) {
-      for (size_t t = begin; t < end; ++t)
-        if (!std::isnan(planes[i][t][0])) visit(t, planes[i][t]);
-    });
-  };
+  bool worthwhile() const { return candidates_ > 0 && largest_ > 0; }
 
-  // By a filter first: of most triangles there is no other in the plane.
-  KeyFilter reachable(candidates);
-  for (size_t i = 0; i < placed.size(); ++i)
-    if (reachable_[placed[i].mesh]) forEach(i, [&](size_t, const Plane& plane) { reachable.insert(keyOf(plane)); });
-  std::mutex mutex;
-  std::vector<std::pair<Face, Plane>> fronts;  // may be found behind one that is reachable
-  for (size_t i = 0; i < placed.size(); ++i) {
-    forEach(i, [&](size_t t, const Plane& plane) {
-      if (!anyCell(opposite(plane), [&](uint64_t key) { return reachable.mayHold(key); })) return;
-      const std::lock_guard lock(mutex);
-      fronts.emplace_back(Face{placed[i].mesh, static_cast<uint32_t>(t), placed[i].instance, false}, plane);
+  void run() {
+    findPlanes();
+    findFronts();
+    const coincident::KeySet backs = markBacks();
+    for (const auto& [face, plane] : fronts_)
+      if (anyCell(opposite(plane), [&](uint64_t key) { return backs.holds(key); })) faces_.faces_.push_back(face);
+  }
+
+ private:
+  void findPlanes() {
+    planes_.resize(placed_.size());
+    for (size_t i = 0; i < placed_.size(); ++i) {
+      if (!faces_.opaque_[placed_[i].mesh]) continue;
+      planes_[i].resize(faces_.meshes_[placed_[i].mesh].triangles.size());
+      parallelChunks(planes_[i].size(), 4096, [&](size_t begin, size_t end) {
+        for (size_t t = begin; t < end; ++t) {
+          const Triangle triangle = faces_.triangleOf(placed_[i].mesh, static_cast<uint32_t>(t), placed_[i].instance);
+          planes_[i][t] = planeOf(triangle.p, triangle.mirrored, largest_);
+        }
+      });
+    }
+  }
+
+  // Calls visit(triangle, plane) for those of a mesh that have an area.
+  template <class Visit>
+  void forEach(size_t i, const Visit& visit) const {
+    parallelChunks(planes_[i].size(), 4096, [&](size_t begin, size_t end) {
+      for (size_t t = begin; t < end; ++t)
+        if (!std::isnan(planes_[i][t][0])) visit(t, planes_[i][t]);
     });
   }
-  KeySet frontKeys;
-  for (const auto& [face, plane] : fronts) frontKeys.add(keyOf(plane));
-  frontKeys.finish();
-  KeySet backKeys;
-  for (size_t i = 0; i < placed.size(); ++i) {
-    if (fronts.empty() || !reachable_[placed[i].mesh]) continue;
-    std::vector<bool>& suspect = suspect_[placed[i].mesh];
-    forEach(i, [&](size_t t, const Plane& plane) {
-      if (!anyCell(opposite(plane), [&](uint64_t key) { return frontKeys.holds(key); })) return;
-      const std::lock_guard lock(mutex);
-      suspect.resize(planes[i].size());
-      suspect[t] = true;
-      backKeys.add(keyOf(plane));
-    });
+
+  // By a filter: of most triangles there is no other in the plane.
+  void findFronts() {
+    coincident::KeyFilter reachable(candidates_);
+    for (size_t i = 0; i < placed_.size(); ++i)
+      if (faces_.reachable_[placed_[i].mesh])
+        forEach(i, [&](size_t, const Plane& plane) { reachable.insert(keyOf(plane)); });
+    std::mutex mutex;
+    for (size_t i = 0; i < placed_.size(); ++i) {
+      forEach(i, [&](size_t t, const Plane& plane) {
+        if (!anyCell(opposite(plane), [&](uint64_t key) { return reachable.mayHold(key); })) return;
+        const std::lock_guard lock(mutex);
+        fronts_.emplace_back(Face{placed_[i].mesh, static_cast<uint32_t>(t), placed_[i].instance, false}, plane);
+      });
+    }
   }
-  backKeys.finish();
-  for (const auto& [face, plane] : fronts)
-    if (anyCell(opposite(plane), [&](uint64_t key) { return backKeys.holds(key); })) faces_.push_back(face);
+
+  // Marks the triangles that may have a front behind them; their planes.
+  coincident::KeySet markBacks() const {
+    coincident::KeySet frontKeys, backKeys;
+    for (const auto& [face, plane] : fronts_) frontKeys.add(keyOf(plane));
+    frontKeys.finish();
+    std::mutex mutex;
+    for (size_t i = 0; i < placed_.size(); ++i) {
+      if (fronts_.empty() || !faces_.reachable_[placed_[i].mesh]) continue;
+      std::vector<bool>& suspect = faces_.suspect_[placed_[i].mesh];
+      forEach(i, [&](size_t t, const Plane& plane) {
+        if (!anyCell(opposite(plane), [&](uint64_t key) { return frontKeys.holds(key); })) return;
+        const std::lock_guard lock(mutex);
+        suspect.resize(planes_[i].size());
+        suspect[t] = true;
+        backKeys.add(keyOf(plane));
+      });
+    }
+    backKeys.finish();
+    return backKeys;
+  }
+
+  CoincidentFaces& faces_;
+  const std::vector<Placed>& placed_;
+  uint64_t candidates_ = 0;                     // triangles of which rays may meet the back
+  float largest_ = 0;                           // coordinate
+  std::vector<std::vector<Plane>> planes_;      // of each placed mesh; not a number where a triangle has no area
+  std::vector<std::pair<Face, Plane>> fronts_;  // may be found behind one that is reachable
+};
+
+void CoincidentFaces::look(const std::vector<Placed>& placed) {
+  Search search(*this, placed);
+  if (!search.worthwhile()) return;
+  search.run();
   listFaces();
 }
 

@@ -48,6 +48,7 @@ class CoincidentFaces {
   };
   Triangle triangleOf(uint32_t mesh, uint32_t triangle, uint32_t instance) const;
   Triangle triangleOf(const RayHit& hit) const { return triangleOf(hit.mesh, hit.triangle, hit.instance); }
+  class Search;
   void look(const std::vector<Placed>& placed);
   void listFaces();
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "renderer/scene/data/lobes.h"
 #include "renderer/scene/scene.h"
 
 namespace braid {
@@ -14,14 +15,7 @@ std::vector<std::string> SceneTraits::names() const {
                                  "alpha-mask",
                                  "alpha-blend",
                                  "culled-faces",
-                                 "specular",
-                                 "transmission",
                                  "volume",
-                                 "diffuse-transmission",
-                                 "clearcoat",
-                                 "sheen",
-                                 "anisotropy",
-                                 "iridescence",
                                  "vertex-colors",
                                  "texture-transforms",
                                  "instances",
@@ -36,53 +30,24 @@ std::vector<std::string> SceneTraits::names() const {
   std::vector<std::string> list;
   for (size_t i = 0; i < std::size(kNames); ++i)
     if (has(1u << i)) list.push_back(kNames[i]);
+  for (const LobeEntry& entry : kLobeTable)
+    if (entry.trait && hasLobe(entry.lobe)) list.push_back(entry.trait);
   return list;
 }
 
 namespace {
 
-uint32_t textureFlags(const Material& m) {
-  uint32_t flags = 0;
-  const TextureRef* refs[] = {&m.baseColorTexture,
-                              &m.metallicRoughnessTexture,
-                              &m.specularGlossinessTexture,
-                              &m.emissiveTexture,
-                              &m.specularTexture,
-                              &m.specularColorTexture,
-                              &m.transmissionTexture,
-                              &m.diffuseTransmissionTexture,
-                              &m.clearcoatTexture,
-                              &m.clearcoatRoughnessTexture,
-                              &m.sheenColorTexture,
-                              &m.sheenRoughnessTexture,
-                              &m.anisotropyTexture,
-                              &m.iridescenceTexture,
-                              &m.iridescenceThicknessTexture,
-                              &m.diffuseTransmissionColorTexture,
-                              &m.normalTexture,
-                              &m.clearcoatNormalTexture};
-  for (const TextureRef* ref : refs) {
-    if (!*ref) continue;
-    flags |= kTraitTextures;
-    if (ref->transformed) flags |= kTraitTextureTransforms;
-  }
-  if (m.normalTexture || m.clearcoatNormalTexture) flags |= kTraitNormalMaps;
-  return flags;
-}
-
 uint32_t materialFlags(const Material& m) {
-  uint32_t flags = textureFlags(m);
+  uint32_t flags = 0;
+  forEachTexture(m, [&](const TextureRef& ref, bool, bool) {
+    if (!ref) return;
+    flags |= kTraitTextures;
+    if (ref.transformed) flags |= kTraitTextureTransforms;
+  });
+  if (m.normalTexture || m.clearcoatNormalTexture) flags |= kTraitNormalMaps;
   if (m.unlit) return flags | kTraitUnlit;
-  const bool hasSpecular = m.metallic > 0 || m.specular > 0 || m.specularGlossiness;
-  if (hasSpecular) flags |= kTraitSpecular;
-  if (m.transmission > 0) flags |= kTraitTransmission;
   if (m.mayBePane()) flags |= kTraitPanes;
   if (m.hasVolume()) flags |= kTraitVolume;
-  if (m.diffuseTransmission > 0) flags |= kTraitDiffuseTransmission;
-  if (m.clearcoat > 0) flags |= kTraitClearcoat;
-  if (maxComponent(m.sheenColor) > 0) flags |= kTraitSheen;
-  if (m.anisotropy != 0) flags |= kTraitAnisotropy;
-  if (m.iridescence > 0) flags |= kTraitIridescence;
   const bool smoothBase = m.roughness < 0.1f || (m.metallicRoughnessTexture && m.roughness > 0);
   if (((m.metallic > 0 || m.transmission > 0 || m.specularGlossiness) && smoothBase) ||
       (m.clearcoat > 0 && m.clearcoatRoughness < 0.1f))
@@ -100,6 +65,7 @@ void Scene::detectTraits() {
     const Material& mat = material(mesh);
     t.triangles += mesh.triangles.size();
     t.flags |= materialFlags(mat);
+    if (!mat.unlit) t.lobes |= materialLobes(mat);
     if (!mesh.colors.empty()) t.flags |= kTraitVertexColors;
     if (mat.alphaMode == AlphaMode::Mask) t.flags |= kTraitAlphaMask;
     if (mat.alphaMode == AlphaMode::Blend) t.flags |= kTraitAlphaBlend;

@@ -16,29 +16,23 @@ enum TraitFlags : uint32_t {
   kTraitAlphaMask = 1u << 2,
   kTraitAlphaBlend = 1u << 3,
   kTraitCulledFaces = 1u << 4,  // single-sided open surfaces
-  kTraitSpecular = 1u << 5,     // any GGX reflection
-  kTraitTransmission = 1u << 6,
-  kTraitVolume = 1u << 7,  // attenuation or refraction inside closed solids
-  kTraitDiffuseTransmission = 1u << 8,
-  kTraitClearcoat = 1u << 9,
-  kTraitSheen = 1u << 10,
-  kTraitAnisotropy = 1u << 11,
-  kTraitIridescence = 1u << 12,
-  kTraitVertexColors = 1u << 13,
-  kTraitTextureTransforms = 1u << 14,
-  kTraitInstances = 1u << 15,
-  kTraitEmissiveTriangles = 1u << 16,
-  kTraitPointLights = 1u << 17,  // point and spot
-  kTraitDirectionalLights = 1u << 18,
-  kTraitEnvironment = 1u << 19,
-  kTraitEnvironmentImage = 1u << 20,
-  kTraitSmoothSpecular = 1u << 21,  // roughness < 0.1 on a metal, clearcoat or transmissive surface: may cast caustics
-  kTraitUnlit = 1u << 22,
-  kTraitPanes = 1u << 23,  // light may go straight on through a surface: Material::mayBePane()
+  kTraitVolume = 1u << 5,       // attenuation or refraction inside closed solids
+  kTraitVertexColors = 1u << 6,
+  kTraitTextureTransforms = 1u << 7,
+  kTraitInstances = 1u << 8,
+  kTraitEmissiveTriangles = 1u << 9,
+  kTraitPointLights = 1u << 10,  // point and spot
+  kTraitDirectionalLights = 1u << 11,
+  kTraitEnvironment = 1u << 12,
+  kTraitEnvironmentImage = 1u << 13,
+  kTraitSmoothSpecular = 1u << 14,  // roughness < 0.1 on a metal, clearcoat or transmissive surface: may cast caustics
+  kTraitUnlit = 1u << 15,
+  kTraitPanes = 1u << 16,  // light may go straight on through a surface: Material::mayBePane()
 };
 
 struct SceneTraits {
-  uint32_t flags = 0;
+  uint32_t flags = 0;  // TraitFlags
+  uint32_t lobes = 0;  // LobeFlags, of all materials
   uint64_t triangles = 0, instancedTriangles = 0;
   uint64_t emissiveTriangles = 0;
   uint64_t punctualLights = 0;
@@ -48,8 +42,8 @@ struct SceneTraits {
   float radius = 0;
 
   bool has(uint32_t flag) const { return (flags & flag) != 0; }
-  bool isSupersetOf(const SceneTraits& other) const { return (flags & other.flags) == other.flags; }
-  // The names of the set flags.
+  bool hasLobe(uint32_t lobe) const { return (lobes & lobe) != 0; }
+  // The names of the set flags and lobes.
   std::vector<std::string> names() const;
 };
 

@@ -21,7 +21,7 @@ constexpr double kMissedLight = 0.01;
 // Whether some of the light of points and directions may be scattered by mirrors or smooth refraction first.
 bool mayMissLight(const SceneTraits& t) {
   return t.has(kTraitPointLights | kTraitDirectionalLights) &&
-         t.has(kTraitSpecular | kTraitTransmission | kTraitClearcoat);
+         t.hasLobe(kLobeSpecular | kLobeTransmission | kLobeClearcoat);
 }
 
 void planUnreachable(const LightReach& reach, Plan& plan) {
@@ -86,9 +86,11 @@ void planIntegrators(const Scene& scene, const Settings& settings, const std::ve
 // The scene's parts that cost something, kept or left out.
 void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
   const SceneTraits& t = scene.traits();
+  const auto line = [&](bool has, const char* subject, const char* kept, const char* left) {
+    plan.lines.push_back({has || settings.full, subject, has ? kept : settings.full ? "kept by --full" : left});
+  };
   const auto part = [&](uint32_t flag, const char* subject, const char* kept, const char* left) {
-    const bool has = t.has(flag) || settings.full;
-    plan.lines.push_back({has, subject, t.has(flag) ? kept : settings.full ? "kept by --full" : left});
+    line(t.has(flag), subject, kept, left);
   };
   part(kTraitAlphaMask | kTraitAlphaBlend | kTraitCulledFaces, "any-hit filter",
        "alpha or open single-sided surfaces let rays pass", "no alpha mode and no open single-sided surface");
@@ -97,15 +99,11 @@ void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
   part(kTraitNormalMaps, "normal maps and tangents", "normal-mapped materials",
        "no normal map and no anisotropy reads them");
   part(kTraitVertexColors, "vertex colours", "COLOR_0 multiplies base colours", "no mesh has vertex colours");
-  part(kTraitSpecular, "specular lobe", "materials reflect specularly", "every material is perfectly diffuse");
-  part(kTraitTransmission, "transmission lobe", "transmissive materials", "no material transmits light");
+  for (const LobeEntry& e : kLobeTable)
+    if (e.part) line(t.hasLobe(e.lobe), e.part, e.kept, e.left);
   part(kTraitPanes, "shadow rays through panes", "thin smooth transmissive surfaces let light straight through",
        "no thin smooth transmissive surface");
   part(kTraitVolume, "media tracking", "closed solids refract or attenuate", "no solid with a volume");
-  part(kTraitClearcoat, "clearcoat lobe", "clearcoat materials", "no clearcoat");
-  part(kTraitSheen, "sheen lobe", "sheen materials", "no sheen");
-  part(kTraitIridescence, "iridescence", "thin films", "no thin film");
-  part(kTraitAnisotropy, "anisotropy", "anisotropic materials", "no anisotropic material");
   part(kTraitInstances, "instance transforms", "meshes placed several times",
        "every mesh is placed once and lies in world space");
   part(kTraitEnvironmentImage, "environment sampling", "an environment image, sampled by luminance",

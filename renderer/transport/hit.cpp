@@ -52,97 +52,88 @@ const std::vector<Vec4>* otherTangents(const TriangleMesh& mesh, uint8_t frame) 
   return &mesh.otherTangents[frame - 1];
 }
 
-}  // namespace
+// What a triangle's vertices give at a hit.
+struct Interpolated {
+  Vec3 ng, ns;  // not of unit length
+  Vec4 tangent;
+};
 
-void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit& hit) {
-  const TriangleMesh& mesh = scene.mesh(query.mesh);
-  const glm::uvec3 index = mesh.triangles[query.triangle];
-  const float u = query.u, v = query.v, w = 1 - u - v;
+// Also places the hit.
+Interpolated interpolateAt(const TriangleMesh& mesh, Hit& hit) {
+  const glm::uvec3 index = mesh.triangles[hit.triangle];
+  const float u = hit.u, v = hit.v, w = 1 - u - v;
   const Vec3 &p0 = mesh.positions[index.x], &p1 = mesh.positions[index.y], &p2 = mesh.positions[index.z];
-  hit.mesh = &mesh;
-  hit.material = &scene.material(mesh);
-  hit.meshIndex = query.mesh;
-  hit.triangle = query.triangle;
-  hit.instance = query.instance;
-  hit.u = u;
-  hit.v = v;
-  hit.distance = query.t;
-  hit.wo = -direction;
-
   const Vec3 a = w * p0, b = u * p1, c = v * p2;
   hit.position = a + b + c;
   // TRAP: the bound must not be taken coordinate by coordinate: on the plane z = 0 it would be 0, yet Embree's distance
   // to that plane has the rounding errors of the triangle's other coordinates in it.
   const Vec3 largest3 = glm::max(glm::max(magnitudes(p0), magnitudes(p1)), magnitudes(p2));
   hit.positionError = gammaBound(8) * maxComponent(largest3);
-  Vec3 ng = glm::cross(p1 - p0, p2 - p0);
-  Vec3 ns = mesh.normals.empty() ? ng : interpolate(mesh.normals, index, u, v);
-  Vec4 tangent = mesh.tangents.empty() ? Vec4(0) : interpolate(mesh.tangents, index, u, v);
-
-  if (query.instance != kNoInstance) {
-    const GroupInstance& instance = scene.instances()[query.instance];
-    const Mat3 linear(instance.toWorld);
-    const Mat3 absolute(magnitudes(linear[0]), magnitudes(linear[1]), magnitudes(linear[2]));
-    const Vec3 translation(instance.toWorld[3]);
-    const Vec3 rounding = (1 + gammaBound(3)) * (absolute * Vec3(hit.positionError)) +
-                          gammaBound(4) * (absolute * magnitudes(hit.position) + magnitudes(translation));
-    hit.positionError = maxComponent(rounding);
-    hit.position = linear * hit.position + translation;
-    // Normals go by the inverse transpose; that keeps the front side also in a mirrored instance.
-    const Mat3 normalMatrix = glm::transpose(Mat3(instance.toObject));
-    ng = normalMatrix * ng;
-    ns = normalMatrix * ns;
-    tangent = Vec4(linear * Vec3(tangent), glm::determinant(linear) < 0 ? -tangent.w : tangent.w);
-  }
-
-  ng = unitNormal(ng, hit.wo);
-  hit.front = glm::dot(hit.wo, ng) >= 0;
-  if (mesh.normals.empty()) {
-    ns = ng;
-  } else {
-    const float length2 = glm::dot(ns, ns);
-    ns = length2 > 0 && std::isfinite(length2) ? ns * (1 / std::sqrt(length2)) : ng;
-    if (glm::dot(ns, ng) < 0) ns = -ns;
-  }
-  hit.smoothNormal = ns;
-
-  const Material& material = *hit.material;
-  // Tangents that the material does not read must not turn the frame: an image would depend on what the loader keeps.
-  if (mesh.tangents.empty() || !material.needsTangents()) {
-    hit.frame = Frame(hit.front ? ns : -ns);
-  } else {
-    Frame frame = tangentFrame(ns, tangent);
-    if (material.normalTexture) {
-      const Vec3 local =
-          mapNormal(scene.lookup(material.normalTexture, mesh, query.triangle, u, v), material.normalScale);
-      // Shading must stay consistent with geometry: a mapped normal below the surface would mirror light into it.
-      const Vec3 mapped = frame.toWorld(local);
-      if (glm::dot(mapped, ng) > 1e-3f) frame = tangentFrame(glm::normalize(mapped), Vec4(frame.s, tangent.w));
-    }
-    if (!hit.front) frame = Frame(frame.s, -frame.t, -frame.n);
-    hit.frame = frame;
-  }
-  hit.ng = hit.front ? ng : -ng;
-  if (!hit.front) hit.smoothNormal = -hit.smoothNormal;
+  const Vec3 ng = glm::cross(p1 - p0, p2 - p0);
+  return {ng, mesh.normals.empty() ? ng : interpolate(mesh.normals, index, u, v),
+          mesh.tangents.empty() ? Vec4(0) : interpolate(mesh.tangents, index, u, v)};
 }
 
-uint32_t materialLobes(const Material& m) {
-  uint32_t lobes = 0;
-  if (m.specularGlossiness) return kLobeDiffuse | kLobeSpecular | kLobeSpecularGlossiness;
-  const bool allMetal = m.metallic >= 1 && !m.metallicRoughnessTexture;
-  const bool dielectric = !allMetal;
-  const bool allTransmission = m.transmission >= 1 && !m.transmissionTexture;
-  if (dielectric && !allTransmission) {
-    if (m.diffuseTransmission < 1 || m.diffuseTransmissionTexture) lobes |= kLobeDiffuse;
-    if (m.diffuseTransmission > 0) lobes |= kLobeDiffuseTransmission;
+void toWorld(const GroupInstance& instance, Hit& hit, Interpolated& at) {
+  const Mat3 linear(instance.toWorld);
+  const Mat3 absolute(magnitudes(linear[0]), magnitudes(linear[1]), magnitudes(linear[2]));
+  const Vec3 translation(instance.toWorld[3]);
+  const Vec3 rounding = (1 + gammaBound(3)) * (absolute * Vec3(hit.positionError)) +
+                        gammaBound(4) * (absolute * magnitudes(hit.position) + magnitudes(translation));
+  hit.positionError = maxComponent(rounding);
+  hit.position = linear * hit.position + translation;
+  // Normals go by the inverse transpose; that keeps the front side also in a mirrored instance.
+  const Mat3 normalMatrix = glm::transpose(Mat3(instance.toObject));
+  at.ng = normalMatrix * at.ng;
+  at.ns = normalMatrix * at.ns;
+  at.tangent = Vec4(linear * Vec3(at.tangent), glm::determinant(linear) < 0 ? -at.tangent.w : at.tangent.w);
+}
+
+// The shading frame about the normals on the front side.
+Frame shadingFrame(const Scene& scene, const Hit& hit, const Interpolated& front) {
+  const Material& material = *hit.material;
+  // Tangents that the material does not read must not turn the frame: an image would depend on what the loader keeps.
+  if (hit.mesh->tangents.empty() || !material.needsTangents()) return Frame(hit.front ? front.ns : -front.ns);
+  Frame frame = tangentFrame(front.ns, front.tangent);
+  if (material.normalTexture) {
+    const Vec3 local =
+        mapNormal(scene.lookup(material.normalTexture, *hit.mesh, hit.triangle, hit.u, hit.v), material.normalScale);
+    // Shading must stay consistent with geometry: a mapped normal below the surface would mirror light into it.
+    const Vec3 mapped = frame.toWorld(local);
+    if (glm::dot(mapped, front.ng) > 1e-3f)
+      frame = tangentFrame(glm::normalize(mapped), Vec4(frame.s, front.tangent.w));
   }
-  if (m.metallic > 0 || m.specular > 0 || m.transmission > 0) lobes |= kLobeSpecular;
-  if (dielectric && m.transmission > 0) lobes |= kLobeTransmission;
-  if (m.clearcoat > 0) lobes |= kLobeClearcoat;
-  if (maxComponent(m.sheenColor) > 0) lobes |= kLobeSheen;
-  if (m.iridescence > 0) lobes |= kLobeIridescence;
-  if (m.anisotropy != 0) lobes |= kLobeAnisotropy;
-  return lobes;
+  return hit.front ? frame : Frame(frame.s, -frame.t, -frame.n);
+}
+
+}  // namespace
+
+void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit& hit) {
+  const TriangleMesh& mesh = scene.mesh(query.mesh);
+  hit.mesh = &mesh;
+  hit.material = &scene.material(mesh);
+  hit.meshIndex = query.mesh;
+  hit.triangle = query.triangle;
+  hit.instance = query.instance;
+  hit.u = query.u;
+  hit.v = query.v;
+  hit.distance = query.t;
+  hit.wo = -direction;
+
+  Interpolated at = interpolateAt(mesh, hit);
+  if (query.instance != kNoInstance) toWorld(scene.instances()[query.instance], hit, at);
+  at.ng = unitNormal(at.ng, hit.wo);
+  hit.front = glm::dot(hit.wo, at.ng) >= 0;
+  if (mesh.normals.empty()) {
+    at.ns = at.ng;
+  } else {
+    const float length2 = glm::dot(at.ns, at.ns);
+    at.ns = length2 > 0 && std::isfinite(length2) ? at.ns * (1 / std::sqrt(length2)) : at.ng;
+    if (glm::dot(at.ns, at.ng) < 0) at.ns = -at.ns;
+  }
+  hit.frame = shadingFrame(scene, hit, at);
+  hit.ng = hit.front ? at.ng : -at.ng;
+  hit.smoothNormal = hit.front ? at.ns : -at.ns;
 }
 
 Spectrum baseColorAt(const Scene& scene, const Hit& hit) {
@@ -155,63 +146,93 @@ Spectrum baseColorAt(const Scene& scene, const Hit& hit) {
   return color;
 }
 
+Spectrum emissionAt(const Scene& scene, const Hit& hit) {
+  if (!hit.front && !hit.material->doubleSided) return Spectrum(0);
+  return scene.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
+}
+
 namespace {
 
-void evaluateLayers(const Scene& scene, const Hit& hit, SurfaceParameters& s) {
-  const Material& m = *hit.material;
-  const auto tex = [&](const TextureRef& ref) { return scene.lookup(ref, *hit.mesh, hit.triangle, hit.u, hit.v); };
-  if (s.lobes & kLobeClearcoat) {
-    s.clearcoat = m.clearcoat * (m.clearcoatTexture ? tex(m.clearcoatTexture).r : 1.0f);
-    s.clearcoatRoughness =
-        m.clearcoatRoughness * (m.clearcoatRoughnessTexture ? tex(m.clearcoatRoughnessTexture).g : 1.0f);
-    Vec3 coat = hit.smoothNormal;
-    if (const auto* tangents = otherTangents(*hit.mesh, m.coatFrame); tangents && m.clearcoatNormalTexture) {
-      const Vec3 front = hit.front ? hit.smoothNormal : -hit.smoothNormal;
-      const Frame f = tangentFrame(front, tangentAt(scene, *tangents, hit));
-      const Vec3 local = mapNormal(tex(m.clearcoatNormalTexture), m.clearcoatNormalScale);
-      const Vec3 mapped = hit.front ? f.toWorld(local) : Frame(f.s, -f.t, -f.n).toWorld(local);
-      if (glm::dot(mapped, hit.ng) > 1e-3f) coat = mapped;
-    } else if (m.clearcoatNormalTexture && !hit.mesh->tangents.empty()) {
-      const Frame smooth(hit.frame.s - hit.smoothNormal * glm::dot(hit.frame.s, hit.smoothNormal), Vec3(0),
-                         hit.smoothNormal);
-      const Vec3 t = glm::normalize(smooth.s);
-      const Vec3 bitangent = glm::cross(hit.smoothNormal, t) *
-                             (glm::dot(glm::cross(hit.frame.n, hit.frame.s), hit.frame.t) < 0 ? -1.0f : 1.0f);
-      const Vec3 mapped = Frame(t, bitangent, hit.smoothNormal)
-                              .toWorld(mapNormal(tex(m.clearcoatNormalTexture), m.clearcoatNormalScale));
-      if (glm::dot(mapped, hit.ng) > 1e-3f) coat = mapped;
-    }
-    s.clearcoatNormal = glm::normalize(hit.frame.toLocal(coat));
+// What the parameters of a lobe are read from.
+class SurfacePoint {
+ public:
+  SurfacePoint(const Scene& scene, const Hit& hit) : scene_(scene), hit_(hit) {}
+  const Material& material() const { return *hit_.material; }
+  Vec4 texture(const TextureRef& ref) const { return scene_.lookup(ref, *hit_.mesh, hit_.triangle, hit_.u, hit_.v); }
+  // The coat's own normal, in the local shading frame.
+  Vec3 coatNormal() const {
+    const Vec3 mapped = material().clearcoatNormalTexture ? mappedCoatNormal() : hit_.smoothNormal;
+    return glm::normalize(hit_.frame.toLocal(glm::dot(mapped, hit_.ng) > 1e-3f ? mapped : hit_.smoothNormal));
   }
-  if (s.lobes & kLobeSheen) {
-    s.sheenColor = m.sheenColor * (m.sheenColorTexture ? Spectrum(tex(m.sheenColorTexture)) : Spectrum(1));
-    s.sheenRoughness = m.sheenRoughness * (m.sheenRoughnessTexture ? tex(m.sheenRoughnessTexture).a : 1.0f);
+  Vec2 anisotropyDirection(Vec2 direction) const;
+
+ private:
+  Vec3 mappedCoatNormal() const;
+
+  const Scene& scene_;
+  const Hit& hit_;
+};
+
+Vec3 SurfacePoint::mappedCoatNormal() const {
+  const Material& m = material();
+  const Vec3& smooth = hit_.smoothNormal;
+  if (const auto* tangents = otherTangents(*hit_.mesh, m.coatFrame)) {
+    const Frame f = tangentFrame(hit_.front ? smooth : -smooth, tangentAt(scene_, *tangents, hit_));
+    const Frame turned = hit_.front ? f : Frame(f.s, -f.t, -f.n);
+    return turned.toWorld(mapNormal(texture(m.clearcoatNormalTexture), m.clearcoatNormalScale));
   }
-  if (s.lobes & kLobeAnisotropy) {
-    s.anisotropy = m.anisotropy;
-    Vec2 direction(1, 0);
-    if (m.anisotropyTexture) {
-      const Vec4 t = tex(m.anisotropyTexture);
-      direction = Vec2(2 * t.r - 1, 2 * t.g - 1);
-      s.anisotropy *= t.b;
-    }
-    const float c = std::cos(m.anisotropyRotation), si = std::sin(m.anisotropyRotation);
-    direction = Vec2(c * direction.x - si * direction.y, si * direction.x + c * direction.y);
-    const float length = glm::length(direction);
-    s.anisotropyDirection = length > 0 ? direction / length : Vec2(1, 0);
-    if (const auto* tangents = otherTangents(*hit.mesh, m.anisotropyFrame)) {
-      const Frame f = tangentFrame(hit.front ? hit.frame.n : -hit.frame.n, tangentAt(scene, *tangents, hit));
-      const Vec2 d = s.anisotropyDirection;
-      s.anisotropyDirection = Vec2(hit.frame.toLocal(d.x * f.s + d.y * f.t));
-    } else if (!hit.front) {
-      s.anisotropyDirection.y = -s.anisotropyDirection.y;  // the frame's bitangent is turned on back faces
-    }
+  if (hit_.mesh->tangents.empty()) return smooth;
+  const Frame& shading = hit_.frame;
+  const Vec3 t = glm::normalize(shading.s - smooth * glm::dot(shading.s, smooth));
+  const Vec3 bitangent =
+      glm::cross(smooth, t) * (glm::dot(glm::cross(shading.n, shading.s), shading.t) < 0 ? -1.0f : 1.0f);
+  return Frame(t, bitangent, smooth).toWorld(mapNormal(texture(m.clearcoatNormalTexture), m.clearcoatNormalScale));
+}
+
+// From the material's tangent space to the plane of the shading frame, as a unit vector.
+Vec2 SurfacePoint::anisotropyDirection(Vec2 direction) const {
+  const Material& m = material();
+  const float c = std::cos(m.anisotropyRotation), si = std::sin(m.anisotropyRotation);
+  direction = Vec2(c * direction.x - si * direction.y, si * direction.x + c * direction.y);
+  const float length = glm::length(direction);
+  const Vec2 d = length > 0 ? direction / length : Vec2(1, 0);
+  if (const auto* tangents = otherTangents(*hit_.mesh, m.anisotropyFrame)) {
+    const Frame f = tangentFrame(hit_.front ? hit_.frame.n : -hit_.frame.n, tangentAt(scene_, *tangents, hit_));
+    return Vec2(hit_.frame.toLocal(d.x * f.s + d.y * f.t));
   }
-  if (s.lobes & kLobeIridescence) {
-    s.iridescence = m.iridescence * (m.iridescenceTexture ? tex(m.iridescenceTexture).r : 1.0f);
-    s.iridescenceIor = m.iridescenceIor;
-    const float t = m.iridescenceThicknessTexture ? tex(m.iridescenceThicknessTexture).g : 1.0f;
-    s.iridescenceThickness = m.iridescenceThicknessMin + (m.iridescenceThicknessMax - m.iridescenceThicknessMin) * t;
+  return hit_.front ? d : Vec2(d.x, -d.y);  // the frame's bitangent is turned on back faces
+}
+
+void readAnisotropy(const SurfacePoint& at, SurfaceParameters& s) {
+  const Material& m = at.material();
+  s.anisotropy = m.anisotropy;
+  Vec2 direction(1, 0);
+  if (m.anisotropyTexture) {
+    const Vec4 t = at.texture(m.anisotropyTexture);
+    direction = Vec2(2 * t.r - 1, 2 * t.g - 1);
+    s.anisotropy *= t.b;
+  }
+  s.anisotropyDirection = at.anisotropyDirection(direction);
+}
+
+void readIridescence(const SurfacePoint& at, SurfaceParameters& s) {
+  const Material& m = at.material();
+  s.iridescence = m.iridescence * (m.iridescenceTexture ? at.texture(m.iridescenceTexture).r : 1.0f);
+  s.iridescenceIor = m.iridescenceIor;
+  const float t = m.iridescenceThicknessTexture ? at.texture(m.iridescenceThicknessTexture).g : 1.0f;
+  s.iridescenceThickness = m.iridescenceThicknessMin + (m.iridescenceThicknessMax - m.iridescenceThicknessMin) * t;
+}
+
+void readTransmission(const SurfacePoint& at, SurfaceParameters& s) {
+  const Material& m = at.material();
+  if (s.lobes & kLobeTransmission)
+    s.transmission = m.transmission * (m.transmissionTexture ? at.texture(m.transmissionTexture).r : 1.0f);
+  if (s.lobes & kLobeDiffuseTransmission) {
+    s.diffuseTransmission =
+        m.diffuseTransmission * (m.diffuseTransmissionTexture ? at.texture(m.diffuseTransmissionTexture).a : 1.0f);
+    s.diffuseTransmissionColor =
+        m.diffuseTransmissionColor *
+        (m.diffuseTransmissionColorTexture ? Spectrum(at.texture(m.diffuseTransmissionColorTexture)) : Spectrum(1));
   }
 }
 
@@ -219,7 +240,7 @@ void evaluateLayers(const Scene& scene, const Hit& hit, SurfaceParameters& s) {
 
 SurfaceParameters surfaceAt(const Scene& scene, const Hit& hit, uint32_t lobes, float etaOutside) {
   const Material& m = *hit.material;
-  const auto tex = [&](const TextureRef& ref) { return scene.lookup(ref, *hit.mesh, hit.triangle, hit.u, hit.v); };
+  const SurfacePoint at(scene, hit);
   SurfaceParameters s;
   s.lobes = lobes;
   s.baseColor = baseColorAt(scene, hit);
@@ -228,7 +249,7 @@ SurfaceParameters surfaceAt(const Scene& scene, const Hit& hit, uint32_t lobes, 
   s.metallic = m.metallic;
   s.roughness = m.roughness;
   if (m.metallicRoughnessTexture) {
-    const Vec4 t = tex(m.metallicRoughnessTexture);
+    const Vec4 t = at.texture(m.metallicRoughnessTexture);
     s.roughness *= t.g;
     s.metallic *= t.b;
   }
@@ -236,27 +257,22 @@ SurfaceParameters surfaceAt(const Scene& scene, const Hit& hit, uint32_t lobes, 
   s.etaOutside = etaOutside;
   s.entering = hit.front;
   s.thinWalled = m.thinWalled;
-  s.specular = m.specular * (m.specularTexture ? tex(m.specularTexture).a : 1.0f);
-  s.specularColor = m.specularColor * (m.specularColorTexture ? Spectrum(tex(m.specularColorTexture)) : Spectrum(1));
+  s.specular = m.specular * (m.specularTexture ? at.texture(m.specularTexture).a : 1.0f);
+  s.specularColor =
+      m.specularColor * (m.specularColorTexture ? Spectrum(at.texture(m.specularColorTexture)) : Spectrum(1));
   if (lobes & kLobeSpecularGlossiness) {
     s.metallic = 0;
     s.specularF0 = m.specularF0;
     if (m.specularGlossinessTexture) {
-      const Vec4 t = tex(m.specularGlossinessTexture);
+      const Vec4 t = at.texture(m.specularGlossinessTexture);
       s.specularF0 *= Spectrum(t);
       s.roughness = 1 - (1 - m.roughness) * t.a;
     }
   }
-  if (lobes & kLobeTransmission)
-    s.transmission = m.transmission * (m.transmissionTexture ? tex(m.transmissionTexture).r : 1.0f);
-  if (lobes & kLobeDiffuseTransmission) {
-    s.diffuseTransmission =
-        m.diffuseTransmission * (m.diffuseTransmissionTexture ? tex(m.diffuseTransmissionTexture).a : 1.0f);
-    s.diffuseTransmissionColor =
-        m.diffuseTransmissionColor *
-        (m.diffuseTransmissionColorTexture ? Spectrum(tex(m.diffuseTransmissionColorTexture)) : Spectrum(1));
-  }
-  if (lobes & (kLobeClearcoat | kLobeSheen | kLobeAnisotropy | kLobeIridescence)) evaluateLayers(scene, hit, s);
+  if (lobes & kTransmittingLobes) readTransmission(at, s);
+  if (lobes & kLobeAnisotropy) readAnisotropy(at, s);
+  if (lobes & kLobeIridescence) readIridescence(at, s);
+  if (lobes & Covers::kLobes) Covers::read(at, lobes, s);
   return s;
 }
 

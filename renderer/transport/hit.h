@@ -38,14 +38,14 @@ BRAID_INLINE Vec3 offsetOrigin(const Hit& hit, const Vec3& direction) {
   return offsetOrigin(hit.position, hit.positionError, hit.ng, direction);
 }
 
-// The lobes that a material can have anywhere on a surface (LobeFlags).
-uint32_t materialLobes(const Material& material);
-
 // Evaluates the material at a hit: textures, vertex colours and factors. `lobes` = materialLobes(); etaOutside is the
 // index around it.
 SurfaceParameters surfaceAt(const Scene& scene, const Hit& hit, uint32_t lobes, float etaOutside);
 
 // The base colour at a hit, without alpha.
 Spectrum baseColorAt(const Scene& scene, const Hit& hit);
+
+// What an emissive surface sends back along the ray that hit it, black behind a single-sided one.
+Spectrum emissionAt(const Scene& scene, const Hit& hit);
 
 }  // namespace braid

@@ -116,73 +116,99 @@ VisibleCells findVisibleCells(const TransportContext& context, const PassSampler
   return cells;
 }
 
-}  // namespace
+// Adds up what light subpaths bring to the cells that the camera sees.
+class ReachSums {
+ public:
+  ReachSums(const TransportContext& context, const VisibleCells& visible)
+      : context_(context), visible_(visible), areas_(lampAreas(context.scene)) {}
 
-LightReach measureLightReach(const TransportContext& context, const Camera& camera, int width, int height) {
-  LightReach reach;
-  const Scene& scene = context.scene;
-  const LightEmission emission(scene, context.lights);
-  if (emission.empty()) return reach;
-  const PassSampler sampler(SamplerKind::Independent, kSeed, 0, 0, 1);
-  const VisibleCells visible = findVisibleCells(context, sampler, camera, width, height);
-  const std::map<uint32_t, double> areas = lampAreas(scene);
-  double total = 0, scattered = 0;
-  std::array<bool, kBatch> deltaFirst;  // of each walk: its first scattering was delta
-  const auto onHit = [&](int index, const SubpathState& state, const SubpathVertex& vertex) {
-    bool& aimless = deltaFirst[static_cast<size_t>(index)];
+  Onward onHit(int index, const SubpathState& state, const SubpathVertex& vertex) {
+    bool& aimless = deltaFirst_[static_cast<size_t>(index)];
     if (vertex.segments <= 2) aimless = vertex.segments == 2 && vertex.deltaOnly;
     if (vertex.woBelow || !vertex.bsdf.hasNonDelta()) return Onward::Scatter;
-    const double density = visible.density(vertex.hit.position);
+    const double density = visible_.density(vertex.hit.position);
     const double light = static_cast<double>(average(vertex.throughput * vertex.bsdf.albedo())),
                  value = density * light;
     if (!(value > 0) || !std::isfinite(value)) return Onward::Scatter;
-    total += value;
-    const bool lamp = state.light < context.lights.firstPositional();
+    total_ += value;
+    const bool lamp = state.light < context_.lights.firstPositional();
     if (aimless && !lamp) {
-      reach.beyondCameraPaths += value;
-      if (vertex.deltaOnly) reach.beyondConnections += visible.densityOverMirrors(vertex.hit.position) * light;
+      reach_.beyondCameraPaths += value;
+      if (vertex.deltaOnly) reach_.beyondConnections += visible_.densityOverMirrors(vertex.hit.position) * light;
     }
-    if (vertex.segments > 1)
-      scattered +=
-          visible.density(vertex.hit.position, vertex.hit.ng) * static_cast<double>(average(vertex.throughput));
-    if (vertex.segments == 1) {
-      reach.direct += value;
-    } else if (state.leastPdfW > kFocusingPdf) {
-      reach.caustic += value;
-      if (!lamp) reach.unreachable += value;
-      reach.causticVariance +=
-          value / chanceToHit(lamp ? areas.at(scene.emitters()[state.light].mesh) : 0, state.travelled);
-    } else {
-      reach.indirect += value;
-    }
+    addShares(state, vertex, value, lamp);
     return Onward::Scatter;
-  };
+  }
 
+  LightReach result() const {
+    LightReach r = reach_;
+    if (total_ > 0)
+      for (double* share : {&r.direct, &r.indirect, &r.caustic, &r.causticVariance, &r.unreachable,
+                            &r.beyondCameraPaths, &r.beyondConnections})
+        *share /= total_;
+    if (scattered_ > 0 && std::isfinite(scattered_))
+      r.scatteredRadiance = scattered_ / (static_cast<double>(kPi) * kPaths * visible_.total());
+    return r;
+  }
+
+ private:
+  void addShares(const SubpathState& state, const SubpathVertex& vertex, double value, bool lamp) {
+    if (vertex.segments == 1) {
+      reach_.direct += value;
+      return;
+    }
+    scattered_ +=
+        visible_.density(vertex.hit.position, vertex.hit.ng) * static_cast<double>(average(vertex.throughput));
+    if (!(state.leastPdfW > kFocusingPdf)) {
+      reach_.indirect += value;
+      return;
+    }
+    reach_.caustic += value;
+    if (!lamp) reach_.unreachable += value;
+    const double area = lamp ? areas_.at(context_.scene.emitters()[state.light].mesh) : 0;
+    reach_.causticVariance += value / chanceToHit(area, state.travelled);
+  }
+
+  const TransportContext& context_;
+  const VisibleCells& visible_;
+  std::map<uint32_t, double> areas_;
+  LightReach reach_;
+  double total_ = 0, scattered_ = 0;
+  std::array<bool, kBatch> deltaFirst_{};  // of each walk: its first scattering was delta
+};
+
+// Starts the light subpath of an item.
+void startLightPath(const TransportContext& context, const LightEmission& emission, const PassSampler& sampler,
+                    uint64_t item, SubpathBatch& batch) {
+  const uint64_t key = sampler.itemKey(item);
+  const SampleBlock u = sampler.block(key, 1);
+  const double select = (static_cast<double>(item) + static_cast<double>(u.u[slot::kLightSelect])) / kPaths;
+  LightStart start;
+  const bool ok =
+      emission.sample(select, {u.u[slot::kLightU], u.u[slot::kLightV]}, {u.u[slot::kBsdfU], u.u[slot::kBsdfV]}, start);
+  // The environment fills so much of what surfaces see that camera paths find it.
+  if (ok && start.light != context.lights.environmentLight())
+    batch.startLight(key, start, emission.mediaAt(start.light));
+  else
+    batch.startNothing();
+}
+
+}  // namespace
+
+LightReach measureLightReach(const TransportContext& context, const Camera& camera, int width, int height) {
+  const LightEmission emission(context.scene, context.lights);
+  if (emission.empty()) return {};
+  const PassSampler sampler(SamplerKind::Independent, kSeed, 0, 0, 1);
+  const VisibleCells visible = findVisibleCells(context, sampler, camera, width, height);
+  ReachSums sums(context, visible);
   SubpathBatch batch(context, sampler, probeWalk(Transport::Power));
   for (uint64_t first = 0; first < kPaths; first += kBatch) {
     batch.clear();
-    for (uint64_t item = first; item < first + kBatch; ++item) {
-      const uint64_t key = sampler.itemKey(item);
-      const SampleBlock u = sampler.block(key, 1);
-      const double select = (static_cast<double>(item) + static_cast<double>(u.u[slot::kLightSelect])) / kPaths;
-      LightStart start;
-      const bool ok = emission.sample(select, {u.u[slot::kLightU], u.u[slot::kLightV]},
-                                      {u.u[slot::kBsdfU], u.u[slot::kBsdfV]}, start);
-      // The environment fills so much of what surfaces see that camera paths find it.
-      if (ok && start.light != context.lights.environmentLight())
-        batch.startLight(key, start, emission.mediaAt(start.light));
-      else
-        batch.startNothing();
-    }
-    batch.run(onHit, [](int, const SubpathState&) {});
+    for (uint64_t item = first; item < first + kBatch; ++item) startLightPath(context, emission, sampler, item, batch);
+    batch.run([&](int i, const SubpathState& state, const SubpathVertex& v) { return sums.onHit(i, state, v); },
+              [](int, const SubpathState&) {});
   }
-  if (total > 0)
-    for (double* share : {&reach.direct, &reach.indirect, &reach.caustic, &reach.causticVariance, &reach.unreachable,
-                          &reach.beyondCameraPaths, &reach.beyondConnections})
-      *share /= total;
-  if (scattered > 0 && std::isfinite(scattered))
-    reach.scatteredRadiance = scattered / (static_cast<double>(kPi) * kPaths * visible.total());
-  return reach;
+  return sums.result();
 }
 
 }  // namespace braid

@@ -25,8 +25,7 @@ Vec2 framePoint(int i) {
 }
 
 float emittedTowards(const Scene& scene, const Hit& hit) {
-  if (!hit.material->emissive() || !(hit.front || hit.material->doubleSided)) return 0;
-  return average(scene.emission(*hit.mesh, hit.triangle, hit.u, hit.v));
+  return hit.material->emissive() ? average(emissionAt(scene, hit)) : 0;
 }
 
 // What the paths of one batch see.

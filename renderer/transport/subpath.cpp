@@ -158,7 +158,7 @@ MisQuantities SubpathBatch::quantitiesAt(const SubpathState& state, const Hit& h
   MisQuantities m = state.mis;
   if (settings_.transport == Transport::Power && state.atStart) {
     // (31)-(33), here and not at the start because the density of choosing the light depends on where its path arrives.
-    const bool twoSided = (context_.summaryOf(hit).lobes & (kLobeTransmission | kLobeDiffuseTransmission)) != 0;
+    const bool twoSided = (context_.summaryOf(hit).lobes & kTransmittingLobes) != 0;
     const float direct = context_.lights.pdfDirect(state.light, hit.position, twoSided ? hit.ng : hit.frame.n, twoSided,
                                                    -state.direction);
     const double emit = static_cast<double>(state.pdfEmit);
@@ -210,7 +210,7 @@ void SubpathBatch::finishVertex(const SubpathState& state, const Hit& hit, Subpa
   vertex.block = state.block();
   vertex.segments = state.segments;
   vertex.travelled = state.travelled;
-  vertex.twoSided = (context_.summaryOf(hit).lobes & (kLobeTransmission | kLobeDiffuseTransmission)) != 0;
+  vertex.twoSided = (context_.summaryOf(hit).lobes & kTransmittingLobes) != 0;
   vertex.woBelow = !(vertex.wo.z > 0);
   vertex.deltaOnly = state.deltaOnly;
 }

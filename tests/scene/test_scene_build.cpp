@@ -21,7 +21,7 @@ bool filtered(TriangleMesh mesh, const Material& material) {
   return Scene(oneMesh(std::move(mesh), material)).accel().filtered();
 }
 
-uint32_t flagsOf(const Material& material) { return Scene(oneMesh(unitQuad(), material)).traits().flags; }
+SceneTraits traitsOf(const Material& material) { return Scene(oneMesh(unitQuad(), material)).traits(); }
 
 }  // namespace
 
@@ -103,24 +103,33 @@ TEST_CASE("Only surfaces that let rays pass get an any-hit filter") {
 
 TEST_CASE("Traits name what a scene contains and nothing else") {
   const Material plain = diffuseMaterial(Spectrum(0.5f));
-  CHECK(flagsOf(plain) == 0);
+  CHECK(traitsOf(plain).flags == 0);
+  CHECK(traitsOf(plain).lobes == kLobeDiffuse);
   const auto with = [&](auto change) {
     Material m = plain;
     change(m);
-    return flagsOf(m);
+    return traitsOf(m).flags;
   };
-  CHECK(with([](Material& m) { m.specular = 1; }) == kTraitSpecular);
+  const auto lobesWith = [&](auto change) {
+    Material m = plain;
+    change(m);
+    return traitsOf(m).lobes;
+  };
+  CHECK(lobesWith([](Material& m) { m.specular = 1; }) == (kLobeDiffuse | kLobeSpecular));
   CHECK(with([](Material& m) { m.alphaMode = AlphaMode::Mask; }) == kTraitAlphaMask);
   CHECK(with([](Material& m) { m.alphaMode = AlphaMode::Blend; }) == kTraitAlphaBlend);
   CHECK(with([](Material& m) { m.doubleSided = false; }) == kTraitCulledFaces);
   CHECK(with([](Material& m) { m.emission = Spectrum(1); }) == kTraitEmissiveTriangles);
-  CHECK(with([](Material& m) { m.diffuseTransmission = 0.5f; }) == kTraitDiffuseTransmission);
-  CHECK(with([](Material& m) { m.sheenColor = Spectrum(1); }) == kTraitSheen);
-  CHECK(with([](Material& m) { m.iridescence = 1; }) == kTraitIridescence);
-  CHECK(with([](Material& m) { m.anisotropy = 1; }) == kTraitAnisotropy);
-  CHECK(with([](Material& m) { m.clearcoat = 1; }) == (kTraitClearcoat | kTraitSmoothSpecular));
+  CHECK(lobesWith([](Material& m) { m.diffuseTransmission = 0.5f; }) == (kLobeDiffuse | kLobeDiffuseTransmission));
+  CHECK(lobesWith([](Material& m) { m.sheenColor = Spectrum(1); }) == (kLobeDiffuse | kLobeSheen));
+  CHECK(lobesWith([](Material& m) { m.iridescence = 1; }) == (kLobeDiffuse | kLobeIridescence));
+  CHECK(lobesWith([](Material& m) { m.anisotropy = 1; }) == (kLobeDiffuse | kLobeAnisotropy));
+  CHECK(lobesWith([](Material& m) { m.clearcoat = 1; }) == (kLobeDiffuse | kLobeClearcoat));
+  CHECK(with([](Material& m) { m.clearcoat = 1; }) == kTraitSmoothSpecular);
   CHECK(with([](Material& m) { m.unlit = true; }) == kTraitUnlit);
-  CHECK(with([](Material& m) { m.transmission = 1, m.thinWalled = false; }) == (kTraitTransmission | kTraitVolume));
+  CHECK(lobesWith([](Material& m) { m.transmission = 1; }) == (kLobeSpecular | kLobeTransmission));
+  CHECK(lobesWith([](Material& m) { m.unlit = true; }) == 0);
+  CHECK(with([](Material& m) { m.transmission = 1, m.thinWalled = false; }) == kTraitVolume);
 
   SceneData lights;
   lights.lights.resize(2);

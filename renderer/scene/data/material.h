@@ -93,8 +93,35 @@ struct Material {
     return transmissive() && thinWalled && !unlit && !specularGlossiness &&
            (metallicRoughnessTexture || (metallic < 1 && roughness * roughness < kSmoothAlpha));
   }
+  bool mayBeDielectric() const { return metallic < 1 || metallicRoughnessTexture; }
+  // Whether something is left somewhere for the lobes below the specular ones.
+  bool mayBeDiffuse() const { return mayBeDielectric() && (transmission < 1 || transmissionTexture); }
   // Tangents are needed by normal maps and by anisotropy.
   bool needsTangents() const { return normalTexture || clearcoatNormalTexture || anisotropy != 0; }
 };
+
+// Calls visit(reference, isColour, isRead) for each texture of a material. Colours are stored in sRGB; what a factor of
+// exactly zero switches off reads no texture.
+template <class MaterialType, class Visit>
+void forEachTexture(MaterialType& m, const Visit& visit) {
+  visit(m.baseColorTexture, true, true);
+  visit(m.specularGlossinessTexture, true, true);
+  visit(m.emissiveTexture, true, !isBlack(m.emission));
+  visit(m.specularColorTexture, true, m.specular != 0);
+  visit(m.diffuseTransmissionColorTexture, true, m.diffuseTransmission != 0);
+  visit(m.sheenColorTexture, true, !isBlack(m.sheenColor));
+  visit(m.metallicRoughnessTexture, false, true);
+  visit(m.normalTexture, false, true);
+  visit(m.specularTexture, false, m.specular != 0);
+  visit(m.transmissionTexture, false, m.transmission != 0);
+  visit(m.diffuseTransmissionTexture, false, m.diffuseTransmission != 0);
+  visit(m.clearcoatTexture, false, m.clearcoat != 0);
+  visit(m.clearcoatRoughnessTexture, false, m.clearcoat != 0);
+  visit(m.clearcoatNormalTexture, false, m.clearcoat != 0);
+  visit(m.sheenRoughnessTexture, false, !isBlack(m.sheenColor));
+  visit(m.anisotropyTexture, false, m.anisotropy != 0);
+  visit(m.iridescenceTexture, false, m.iridescence != 0);
+  visit(m.iridescenceThicknessTexture, false, m.iridescence != 0);
+}
 
 }  // namespace braid

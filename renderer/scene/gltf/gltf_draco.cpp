@@ -103,4 +103,17 @@ std::optional<DracoMesh> decodeDraco(const Document& document, const MeshJob& jo
   return {};
 }
 
+uint64_t estimatedBytes(const Document& document, const Primitive& primitive) {
+  const auto position = primitive.attributes.find("POSITION");
+  if (position == primitive.attributes.end() || primitive.mode < 4) return 0;
+  const uint64_t vertices = document.accessor(position->second).count;
+  const uint64_t indices = primitive.indices < 0 ? vertices : document.accessor(primitive.indices).count;
+  const uint64_t triangles = primitive.mode == 4 ? indices / 3 : indices;
+  // Vertices that no triangle uses are dropped. Decompressing the same data again and again would take for ever too.
+  constexpr uint64_t kDracoRatio = 8;
+  const int view = index(member(primitive.extensions, "KHR_draco_mesh_compression"), "bufferView");
+  const uint64_t compressed = view < 0 ? 0 : document.views[static_cast<size_t>(view)].data.size() * kDracoRatio;
+  return compressed + triangles * sizeof(glm::uvec3) + std::min(vertices, triangles * 3) * 2 * sizeof(Vec3);
+}
+
 }  // namespace braid::gltf

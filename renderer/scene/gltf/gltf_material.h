@@ -11,29 +11,6 @@
 
 namespace braid::gltf {
 
-// Calls visit(reference, isColour) for each texture of a material; colours are stored in sRGB.
-template <class MaterialType, class Visit>
-void forEachTexture(MaterialType& m, const Visit& visit) {
-  visit(m.baseColorTexture, true);
-  visit(m.specularGlossinessTexture, true);
-  visit(m.emissiveTexture, true);
-  visit(m.specularColorTexture, true);
-  visit(m.diffuseTransmissionColorTexture, true);
-  visit(m.sheenColorTexture, true);
-  visit(m.metallicRoughnessTexture, false);
-  visit(m.normalTexture, false);
-  visit(m.specularTexture, false);
-  visit(m.transmissionTexture, false);
-  visit(m.diffuseTransmissionTexture, false);
-  visit(m.clearcoatTexture, false);
-  visit(m.clearcoatRoughnessTexture, false);
-  visit(m.clearcoatNormalTexture, false);
-  visit(m.sheenRoughnessTexture, false);
-  visit(m.anisotropyTexture, false);
-  visit(m.iridescenceTexture, false);
-  visit(m.iridescenceThicknessTexture, false);
-}
-
 // The image that a texture reads, WebP where there is a choice; -1: none in a supported format.
 int imageOf(const tinygltf::Texture& texture);
 

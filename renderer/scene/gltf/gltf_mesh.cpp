@@ -156,23 +156,11 @@ class MeshBuilder {
       for (size_t i = 0; i < mesh_.triangles.size(); ++i)
         mesh_.triangles[i] = {indices[3 * i], indices[3 * i + 1], indices[3 * i + 2]};
     } else {
-      joinTriangles(indices);
+      mesh_.triangles = joinedTriangles(indices, primitive_.mode == 5);
     }
     // Validation reported the indices of vertices that do not exist: only their triangles are lost.
     std::erase_if(mesh_.triangles,
                   [&](const glm::uvec3& t) { return t.x >= vertices_ || t.y >= vertices_ || t.z >= vertices_; });
-  }
-
-  void joinTriangles(const std::vector<uint32_t>& indices) {
-    const bool isStrip = primitive_.mode == 5;
-    for (size_t i = 0; i + 2 < indices.size(); ++i) {
-      const size_t odd = isStrip ? i % 2 : 0;
-      if (isStrip) {
-        mesh_.triangles.push_back({indices[i], indices[i + 1 + odd], indices[i + 2 - odd]});
-      } else {
-        mesh_.triangles.push_back({indices[i + 1], indices[i + 2], indices[0]});
-      }
-    }
   }
 
   // Many primitives may each use a small part of one large set of vertices: only that part is read.
@@ -350,18 +338,5 @@ TriangleMesh buildMesh(const Document& document, const MeshJob& job, Report& rep
 }
 
 bool isPacked(const Primitive& primitive) { return primitive.extensions.contains("KHR_draco_mesh_compression"); }
-
-uint64_t estimatedBytes(const Document& document, const Primitive& primitive) {
-  const auto position = primitive.attributes.find("POSITION");
-  if (position == primitive.attributes.end() || primitive.mode < 4) return 0;
-  const uint64_t vertices = document.accessor(position->second).count;
-  const uint64_t indices = primitive.indices < 0 ? vertices : document.accessor(primitive.indices).count;
-  const uint64_t triangles = primitive.mode == 4 ? indices / 3 : indices;
-  // Vertices that no triangle uses are dropped. Decompressing the same data again and again would take for ever too.
-  constexpr uint64_t kDracoRatio = 8;
-  const int view = index(member(primitive.extensions, "KHR_draco_mesh_compression"), "bufferView");
-  const uint64_t compressed = view < 0 ? 0 : document.views[static_cast<size_t>(view)].data.size() * kDracoRatio;
-  return compressed + triangles * sizeof(glm::uvec3) + std::min(vertices, triangles * 3) * 2 * sizeof(Vec3);
-}
 
 }  // namespace braid::gltf

@@ -6,6 +6,7 @@
 
 #include "renderer/core/parallel.h"
 #include "renderer/scene/data/placement.h"
+#include "renderer/scene/gltf/gltf_variants.h"
 
 namespace braid::gltf {
 
@@ -44,7 +45,7 @@ class SceneBuilder {
         materials_(materials),
         scene_(scene),
         pose_(makePose(document, options)) {
-    findVariant();
+    variant_ = chosenVariant(document_, options_.variant);
     skins_.resize(document.model.skins.size());
   }
 
@@ -61,20 +62,6 @@ class SceneBuilder {
   }
 
  private:
-  void findVariant() {
-    if (options_.variant.empty()) return;
-    const auto found = std::find(document_.variants.begin(), document_.variants.end(), options_.variant);
-    if (found != document_.variants.end()) {
-      variant_ = static_cast<int>(found - document_.variants.begin());
-      return;
-    }
-    std::string names;
-    for (const std::string& name : document_.variants) names += (names.empty() ? "" : ", ") + quoted(name);
-    throw SceneError(ExitCode::BadInput, document_.path, "/extensions/KHR_materials_variants/variants",
-                     "variant " + quoted(options_.variant) + " does not exist; " +
-                         (names.empty() ? "the file has no variants" : "the file has " + names));
-  }
-
   const tinygltf::Node& nodeAt(int node) const { return document_.model.nodes[static_cast<size_t>(node)]; }
 
   std::vector<int> rootsOfScene() {
@@ -206,20 +193,6 @@ class SceneBuilder {
         if (shapeOf(toWorld) == Shape::Flat) budget(estimatedBytes(document_, mesh.primitives[p]));
       }
     }
-  }
-
-  // Variant and material, in the order of the file.
-  static std::vector<std::pair<int, int>> variantsOf(const Primitive& primitive) {
-    std::vector<std::pair<int, int>> variants;
-    const Value& mappings = member(member(primitive.extensions, "KHR_materials_variants"), "mappings");
-    for (size_t i = 0; i < mappings.ArrayLen(); ++i) {
-      const Value& mapping = mappings.Get(static_cast<int>(i));
-      const Value& list = member(mapping, "variants");
-      if (gltf::index(mapping, "material") < 0) continue;  // reported with the JSON
-      for (size_t k = 0; k < list.ArrayLen(); ++k)
-        variants.emplace_back(list.Get(static_cast<int>(k)).GetNumberAsInt(), gltf::index(mapping, "material"));
-    }
-    return variants;
   }
 
   const Primitive* representative(const Primitive& primitive) {

@@ -50,16 +50,11 @@ Wrap wrapOf(int mode) {
   return mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::Mirror : Wrap::Repeat;
 }
 
-// Factors of exactly zero switch whole lobes off; their textures need not be read.
+// The textures of lobes that are switched off need not be read.
 void dropUnreadTextures(Material& m) {
-  if (isBlack(m.emission)) m.emissiveTexture = {};
-  if (m.transmission == 0) m.transmissionTexture = {};
-  if (m.diffuseTransmission == 0) m.diffuseTransmissionTexture = m.diffuseTransmissionColorTexture = {};
-  if (m.clearcoat == 0) m.clearcoatTexture = m.clearcoatRoughnessTexture = m.clearcoatNormalTexture = {};
-  if (isBlack(m.sheenColor)) m.sheenColorTexture = m.sheenRoughnessTexture = {};
-  if (m.anisotropy == 0) m.anisotropyTexture = {};
-  if (m.iridescence == 0) m.iridescenceTexture = m.iridescenceThicknessTexture = {};
-  if (m.specular == 0) m.specularTexture = m.specularColorTexture = {};
+  forEachTexture(m, [](TextureRef& ref, bool, bool isRead) {
+    if (!isRead) ref = {};
+  });
 }
 
 struct DecodedImage {
@@ -112,7 +107,7 @@ void decode(const Document& document, const ImageSource& source, PixelBudget& bu
 
 MaterialTable::Uvs MaterialTable::assignUvSlots(Material& material, int fileMaterial) {
   std::set<uint32_t> sets;
-  forEachTexture(material, [&](const TextureRef& ref, bool) {
+  forEachTexture(material, [&](const TextureRef& ref, bool, bool) {
     if (ref) sets.insert(ref.uvSet);
   });
   Uvs uvs;
@@ -130,7 +125,7 @@ MaterialTable::Uvs MaterialTable::assignUvSlots(Material& material, int fileMate
   for (const uint32_t set : sets) {
     if (slot < kUvSlots) uvs.set[slot++] = set;
   }
-  forEachTexture(material, [&](TextureRef& ref, bool) {
+  forEachTexture(material, [&](TextureRef& ref, bool, bool) {
     const auto found = std::find(uvs.set.begin(), uvs.set.end(), ref.uvSet);
     ref.uvSet = static_cast<uint8_t>(found == uvs.set.end() ? 0 : found - uvs.set.begin());
   });
@@ -150,7 +145,7 @@ uint32_t MaterialTable::use(int fileMaterial) {
   }
   material.doubleSided |= doubleSided_;
   dropUnreadTextures(material);
-  forEachTexture(material, [&](TextureRef& ref, bool) {
+  forEachTexture(material, [&](TextureRef& ref, bool, bool) {
     if (!ref) return;
     const tinygltf::Texture& texture = document_.model.textures[static_cast<size_t>(ref.texture)];
     document_.usage.mark("textures", ref.texture);
@@ -159,7 +154,7 @@ uint32_t MaterialTable::use(int fileMaterial) {
     if (imageOf(texture) < 0) ref = {};
   });
   uvs_.push_back(assignUvSlots(material, fileMaterial));
-  forEachTexture(material, [&](TextureRef& ref, bool isColour) {
+  forEachTexture(material, [&](TextureRef& ref, bool isColour, bool) {
     if (!ref) return;
     const auto next = static_cast<int32_t>(textures_.size());
     ref.texture = textures_.emplace(std::make_pair(ref.texture, isColour), next).first->second;
@@ -231,7 +226,7 @@ void MaterialTable::dropMissingTextures() {
   }
   std::erase_if(scene_.textures, [](const Texture& texture) { return !texture.sharedImage(); });
   for (Material& material : scene_.materials) {
-    forEachTexture(material, [&](TextureRef& ref, bool) {
+    forEachTexture(material, [&](TextureRef& ref, bool, bool) {
       if (ref) ref.texture = placed[static_cast<size_t>(ref.texture)];
     });
   }

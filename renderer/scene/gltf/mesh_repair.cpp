@@ -28,6 +28,18 @@ glm::dvec3 unitOrZero(const glm::dvec3& v) {
 
 }  // namespace
 
+std::vector<glm::uvec3> joinedTriangles(const std::vector<uint32_t>& indices, bool isStrip) {
+  std::vector<glm::uvec3> triangles;
+  for (size_t i = 0; i + 2 < indices.size(); ++i) {
+    const size_t odd = isStrip ? i % 2 : 0;
+    if (isStrip)
+      triangles.push_back({indices[i], indices[i + 1 + odd], indices[i + 2 - odd]});
+    else
+      triangles.push_back({indices[i + 1], indices[i + 2], indices[0]});
+  }
+  return triangles;
+}
+
 bool dropBadTriangles(TriangleMesh& mesh, Report& report, const std::string& place) {
   const auto isBad = [&](const glm::uvec3& t) {
     return !isUsable(mesh.positions[t.x]) || !isUsable(mesh.positions[t.y]) || !isUsable(mesh.positions[t.z]);

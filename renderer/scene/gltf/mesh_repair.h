@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Makes a mesh safe to render: no NaN, unit normals and tangents, no unused vertices.
+// Makes a mesh safe to render: lists of triangles, no NaN, unit normals and tangents, no unused vertices.
 #pragma once
 
 #include <string>
@@ -20,6 +20,9 @@ inline Vec3 normalizedOr(const Vec3& v, const Vec3& fallback) {
   const double length = glm::length(d);
   return length > 1e-6 && length < 1e18 ? Vec3(d / length) : fallback;
 }
+
+// The triangles of a strip, or of a fan.
+std::vector<glm::uvec3> joinedTriangles(const std::vector<uint32_t>& indices, bool isStrip);
 
 // Drops triangles with a vertex that is not finite, or beyond what the ray tracer can hold. Returns whether any are
 // left.

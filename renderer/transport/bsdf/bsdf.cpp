@@ -1,141 +1,61 @@
 // SPDX-License-Identifier: Apache-2.0
-// Set-up of the lobes, the choice among them, and the public operations. The lobes: lobes_specular.cpp,
-// lobes_layers.cpp; groups of them: lobe_groups.cpp.
+// Set-up of the layers, the choice among their lobes, and the public operations. Groups of lobes: lobe_groups.cpp.
 #include "renderer/transport/bsdf/bsdf.h"
 
-#include <algorithm>
-#include <cmath>
-
 namespace braid {
+
 namespace {
 
-bool anyPositive(const Spectrum& s) { return s.x > 0 || s.y > 0 || s.z > 0; }
-
-// A rough refraction bends by about |eta - 1| times the slope of the microfacets. Below this it is a mirror's: float
-// half vectors, which are differences of nearly opposite directions then, carry no more information.
-constexpr float kMinBending = 1e-4f;
+// What a cover leaves of the light from wi that the base scatters to wo: KHR_materials_sheen's minimum, reciprocal and
+// never more than the light that was not reflected. Only sides that carry the cover count.
+template <class Cover>
+float belowCover(const Cover& cover, bool coatedO, bool coatedI, const Vec3& wi) {
+  return std::min(coatedO ? cover.below() : 1.0f, coatedI ? cover.below(wi) : 1.0f);
+}
 
 }  // namespace
 
 void Bsdf::initLayers(const SurfaceParameters& p, Transport transport) {
-  lobes_ = p.lobes;
-  entering_ = p.entering;
-  const bool metallicWorkflow = has(kLobeSpecular) && !has(kLobeSpecularGlossiness);
-  metallic_ = metallicWorkflow ? p.metallic : 0.0f;
-  const float transmission = has(kLobeTransmission) ? p.transmission : 0.0f;
+  lobes_ = Covers::present(p, p.lobes);
   const float through = has(kLobeDiffuseTransmission) ? p.diffuseTransmission : 0.0f;
-  const float share = (1 - metallic_) * (1 - transmission);
+  const float share = (1 - p.metalShare()) * (1 - p.transmissionShare());
   Spectrum diffuseColor = p.baseColor;
   if (has(kLobeSpecularGlossiness)) diffuseColor *= std::max(1 - maxComponent(p.specularF0), 0.0f);
   diffuse_ = has(kLobeDiffuse) ? diffuseColor * (share * (1 - through)) : Spectrum(0);
   diffuseTransmission_ = has(kLobeDiffuseTransmission) ? p.diffuseTransmissionColor * (share * through) : Spectrum(0);
-  transmission_ = p.baseColor * ((1 - metallic_) * transmission);
-
-  const auto keep = [&](uint32_t lobe, bool condition) {
-    if (!condition) lobes_ &= ~lobe;
-  };
-  keep(kLobeDiffuse, anyPositive(diffuse_));
-  keep(kLobeDiffuseTransmission, anyPositive(diffuseTransmission_));
-  keep(kLobeTransmission, anyPositive(transmission_));
-  keep(kLobeClearcoat, has(kLobeClearcoat) && p.clearcoat > 0);
-  keep(kLobeSheen, has(kLobeSheen) && anyPositive(p.sheenColor));
-  keep(kLobeIridescence, has(kLobeIridescence) && p.iridescence > 0);
-
-  if (has(kLobeSpecular | kLobeTransmission)) initSpecular(p);
-  straight_ = has(kLobeTransmission) && p.thinWalled && smooth_;
-  radianceScale_ = has(kLobeTransmission) ? 1 / sqr(eta_) : 1.0f;
-  transmissionScale_ = transport == Transport::Radiance ? 1.0f : sqr(eta_);
+  if (!anyPositive(diffuse_)) lobes_ &= ~uint32_t{kLobeDiffuse};
+  if (!anyPositive(diffuseTransmission_)) lobes_ &= ~uint32_t{kLobeDiffuseTransmission};
+  lobes_ = specular_.init(p, lobes_, transport);
 
   // A coat covers the outside; a thin wall has two outsides.
   coatedHere_ = p.thinWalled || p.entering;
   coatedThere_ = p.thinWalled || !p.entering;
-  if (has(kLobeSheen)) initSheen(p);
-  if (has(kLobeClearcoat)) initClearcoat(p);
-  initBelowSpecular();
+  covers_.upward([&](auto& cover, size_t) {
+    if (has(cover.kLobe)) cover.init(p);
+  });
 
   // What remains may be a plain diffuse surface, for instance with specular 0.
   diffuseOnly_ = lobes_ == kLobeDiffuse;
-  scatter_ = lobes_;
-  group_ = LobeGroup::All;
+  setScattering(LobeGroup::All, lobes_);
   if (!diffuseOnly_) initDirection();
 }
 
-void Bsdf::initSpecular(const SurfaceParameters& p) {
-  const float indexF0 = fresnelF0(p.etaInside, p.etaOutside);
-  weight_ = !has(kLobeSpecular) ? 0.0f : has(kLobeSpecularGlossiness) ? 1.0f : p.specular;
-  dielectricF0_ = has(kLobeSpecularGlossiness) ? p.specularF0
-                  : has(kLobeSpecular)         ? glm::min(indexF0 * p.specularColor, Spectrum(1))
-                                               : Spectrum(0);
-  metalF0_ = p.baseColor;
-  f0_ = glm::mix(dielectricF0_ * weight_, metalF0_, metallic_);
-  f90_ = glm::mix(weight_, 1.0f, metallic_);
-  baseF0_ = weight_ * maxComponent(dielectricF0_);
-  baseF90_ = weight_;
-
-  // TRAP: index 0 is the specular-glossiness idiom and refracts nowhere; such a wall blurs like a thin one.
-  refractive_ = has(kLobeTransmission) && !p.thinWalled && p.etaInside > 0 && p.etaOutside > 0;
-  eta_ = !refractive_ ? 1.0f : p.entering ? p.etaInside / p.etaOutside : p.etaOutside / p.etaInside;
-  if (has(kLobeIridescence)) {
-    iridescence_ = p.iridescence;
-    film_ = {p.etaOutside > 0 ? p.etaOutside : 1.0f, std::max(p.iridescenceIor, 1.0f), p.iridescenceThickness};
-  }
-  general_ = refractive_ || has(kLobeIridescence);
-  // Without any specular reflection only total reflection inside a solid needs the lobe.
-  if (f90_ == 0 && !anyPositive(f0_) && !refractive_ && !has(kLobeIridescence)) lobes_ &= ~uint32_t{kLobeSpecular};
-  initDistribution(p);
-}
-
-void Bsdf::initDistribution(const SurfaceParameters& p) {
-  const float alpha = sqr(p.roughness);
-  ggx_.alphaX = ggx_.alphaY = alpha;
-  if (has(kLobeAnisotropy) && p.anisotropy != 0) {
-    ggx_.alphaX = glm::mix(alpha, 1.0f, sqr(p.anisotropy));
-    tangent_ = p.anisotropyDirection;
-  } else {
-    lobes_ &= ~uint32_t{kLobeAnisotropy};
-  }
-  smooth_ = std::max(ggx_.alphaX, ggx_.alphaY) < Ggx::kMinAlpha;
-  if (smooth_) {
-    ggx_.alphaX = ggx_.alphaY = 0;
-    lobes_ &= ~uint32_t{kLobeAnisotropy};
-  } else {
-    ggx_.alphaX = std::max(ggx_.alphaX, Ggx::kMinAlpha);
-    ggx_.alphaY = std::max(ggx_.alphaY, Ggx::kMinAlpha);
-  }
-  const float bending = std::fabs(eta_ - 1) * std::min(ggx_.alphaX, ggx_.alphaY);
-  passThrough_ = has(kLobeTransmission) && refractive_ && !smooth_ && bending < kMinBending;
-}
-
-void Bsdf::initBelowSpecular() {
-  const bool specular = has(kLobeSpecular | kLobeTransmission);
-  if (!specular) smooth_ = passThrough_ = general_ = refractive_ = false;
-  constexpr uint32_t kOthers = kLobeDiffuse | kLobeDiffuseTransmission | kLobeSheen | kLobeClearcoat;
-  microfacetOnly_ = !has(kOthers) && !passThrough_;
-  weighsDiffuse_ = specular && (has(kLobeDiffuse | kLobeDiffuseTransmission) || passThrough_);
-  nonDelta_ = has(kLobeDiffuse | kLobeDiffuseTransmission) || (specular && !smooth_) ||
-              (has(kLobeSheen) && coatedHere_) || (has(kLobeClearcoat) && coatedHere_ && !clearcoatSmooth_);
-  if (!weighsDiffuse_) return;
-  row_ = ggxTableRow(ggx_.alphaX);
-  rowAcross_ = has(kLobeAnisotropy) ? ggxTableRow(ggx_.alphaY) : row_;
-  initMeanAlbedo();
+void Bsdf::setScattering(LobeGroup group, uint32_t lobes) {
+  group_ = group;
+  scatter_ = lobes;
+  // Covers count even if they do not scatter: they take light away from the microfacets.
+  microfacetOnly_ = !scatters(kDiffuseLobes) && !has(Covers::kLobes) && !specular_.passesThrough();
+  nonDelta_ = scatters(kDiffuseLobes) || (scatters(SpecularLayer::kLobes) && !specular_.smooth());
+  covers_.upward([&](const auto& cover, size_t) {
+    if (scatters(cover.kLobe) && coatedHere_ && !cover.smooth()) nonDelta_ = true;
+  });
 }
 
 void Bsdf::initDirection() {
-  if (has(kLobeSpecular | kLobeTransmission)) stretchO_ = ggx_.stretch(toGgx(wo_));
-  if (weighsDiffuse_) {
-    albedoO_ = ggxAlbedo(row_, wo_.z);
-    const bool plain = !general_ && !has(kLobeAnisotropy);
-    belowSpecularO_ = 1 - (plain ? dielectricAlbedo(albedoO_) : dielectricAlbedo(0, wo_.z));
-  }
-  if (has(kLobeSheen) && coatedHere_) {
-    sheenAlbedoO_ = sheenAlbedo(sheenRow_, wo_.z);
-    sheenBelowO_ = belowSheen(sheenAlbedoO_);
-  }
-  if (has(kLobeClearcoat) && coatedHere_) {
-    // As for the shading normal: directions below the coat's horizon are lifted to it.
-    clearcoatCosO_ = std::max(glm::dot(clearcoatNormal_, wo_), 1e-4f);
-    clearcoatBelowO_ = belowClearcoat(clearcoatCosO_);
-  }
+  if (specular_.present()) specular_.setDirection(wo_);
+  covers_.upward([&](auto& cover, size_t) {
+    if (has(cover.kLobe) && coatedHere_) cover.setDirection(wo_);
+  });
   select_ = select();
 }
 
@@ -143,82 +63,71 @@ Bsdf Bsdf::reversed(const Vec3& wi) const {
   Bsdf b = *this;
   b.wo_ = aboveHorizon(wi);
   if (wi.z < 0) {
-    b.entering_ = !entering_;
-    if (has(kLobeSpecular | kLobeTransmission)) b.eta_ = 1 / eta_;
+    if (specular_.present()) b.specular_.turn();
     std::swap(b.coatedHere_, b.coatedThere_);
-    if (weighsDiffuse_) {
-      std::swap(b.curve_[0], b.curve_[1]);
-      std::swap(b.meanAlbedo_[0], b.meanAlbedo_[1]);
-    }
-    // The other side's frame has the same x and y and the opposite z; the coat's normal points to that side there.
-    if (has(kLobeClearcoat)) b.clearcoatNormal_ = Vec3(-clearcoatNormal_.x, -clearcoatNormal_.y, clearcoatNormal_.z);
+    b.covers_.upward([&](auto& cover, size_t) {
+      if (has(cover.kLobe)) cover.turn();
+    });
   }
   b.initDirection();
   return b;
 }
 
-// smooth: ignore what roughness does to the albedo.
-Bsdf::LobeAlbedos Bsdf::lobeAlbedos(bool smooth) const {
-  LobeAlbedos a;
-  const float below = weighsDiffuse_ ? belowSpecularO_ : 1.0f;
+// exact = false: ignores what roughness does to the albedo.
+Bsdf::Albedos Bsdf::albedos(bool exact) const {
+  Albedos a;
+  const float below = specular_.below();
   a.diffuse = diffuse_ * below;
   a.diffuseTransmission = diffuseTransmission_ * below;
-  if (has(kLobeSpecular | kLobeTransmission)) {
-    const FresnelTerm f = fresnel(wo_.z);
-    a.reflection = f.reflect;
-    if (!smooth && !smooth_ && weighsDiffuse_) {
-      a.reflection = general_ ? f.reflect * (albedoO_.f0 + albedoO_.f90) : f0_ * albedoO_.f0 + f90_ * albedoO_.f90;
-    }
-    a.transmission = transmission_ * f.base;
-  }
-  Spectrum cover(1);
-  if (has(kLobeClearcoat) && coatedHere_) {
-    a.clearcoat = Spectrum(1 - clearcoatBelowO_);
-    cover *= clearcoatBelowO_;
-  }
-  if (has(kLobeSheen) && coatedHere_) {
-    a.sheen = cover * sheenColor_ * ((1 - sheenBelowO_) / sheenMax_);
-    cover *= sheenBelowO_;
-  }
-  a.diffuse *= cover;
-  a.diffuseTransmission *= cover;
-  a.reflection *= cover;
-  a.transmission *= cover;
+  if (specular_.present()) a.specular = specular_.albedos(exact);
+  Spectrum above(1);
+  covers_.downward([&](const auto& cover, size_t i) {
+    if (!has(cover.kLobe) || !coatedHere_) return;
+    a.covers[i] = cover.albedo(above);
+    above *= cover.below();
+  });
+  a.diffuse *= above;
+  a.diffuseTransmission *= above;
+  a.specular.reflection *= above;
+  a.specular.transmission *= above;
   return a;
 }
 
-Bsdf::Selection Bsdf::select() const {
-  Selection s{};
-  if (has(kLobeSpecular | kLobeTransmission) && microfacetOnly_) {
-    s.specular = 1;
-    return group_ == LobeGroup::All ? s : restrictedTo(group_, s);
-  }
-  const LobeAlbedos a = lobeAlbedos(false);
-  s.diffuse = average(a.diffuse);
-  s.diffuseTransmission = average(a.diffuseTransmission);
-  s.specular = average(a.reflection);
-  (passThrough_ ? s.passThrough : s.specular) += average(a.transmission);
-  s.sheen = average(a.sheen);
-  s.clearcoat = average(a.clearcoat);
+Spectrum Bsdf::layersAlbedo() const {
+  const Albedos a = albedos(false);
+  Spectrum sum = a.diffuse + a.diffuseTransmission + a.specular.reflection + a.specular.transmission;
+  for (const Spectrum& cover : a.covers) sum += cover;
+  return glm::clamp(sum, Spectrum(0), Spectrum(1));
+}
 
-  float* const all[] = {&s.diffuse, &s.diffuseTransmission, &s.specular, &s.passThrough, &s.sheen, &s.clearcoat};
-  float total = 0, count = 0;
-  for (const float* w : all) {
-    total += *w;
-    count += *w > 0 ? 1.0f : 0.0f;
+Spectrum Bsdf::transmittance() const {
+  return specular_.transmission() * (specular_.transmittance() * belowCovers(-wo_));
+}
+
+Bsdf::Probabilities Bsdf::select() const {
+  Probabilities p{};
+  if (specular_.present() && microfacetOnly_) {
+    p[kSpecular] = 1;
+    return group_ == LobeGroup::All ? p : restrictedTo(group_, p);
   }
-  if (!(total > 0)) return Selection{};
+  const Albedos a = albedos(true);
+  p[kDiffuse] = average(a.diffuse);
+  p[kDiffuseTransmission] = average(a.diffuseTransmission);
+  p[kSpecular] = average(a.specular.reflection);
+  p[specular_.passesThrough() ? kPassThrough : kSpecular] += average(a.specular.transmission);
+  for (size_t i = 0; i < Covers::kCount; ++i) p[kFirstCover + i] = average(a.covers[i]);
+
+  float total = 0, count = 0;
+  for (const float w : p) {
+    total += w;
+    count += w > 0 ? 1.0f : 0.0f;
+  }
+  if (!(total > 0)) return Probabilities{};
   // The albedos are estimates: every lobe keeps a share, which bounds the weight of what an estimate missed.
   constexpr float kFloor = 0.05f;
   const float scale = 1 / (total * (1 + kFloor * count));
-  for (float* w : all) *w = *w > 0 ? (*w + kFloor * total) * scale : 0.0f;
-  return group_ == LobeGroup::All ? s : restrictedTo(group_, s);
-}
-
-Spectrum Bsdf::layersAlbedo() const {
-  const LobeAlbedos a = lobeAlbedos(true);
-  const Spectrum sum = a.diffuse + a.diffuseTransmission + a.reflection + a.transmission + a.sheen + a.clearcoat;
-  return glm::clamp(sum, Spectrum(0), Spectrum(1));
+  for (float& w : p) w = w > 0 ? (w + kFloor * total) * scale : 0.0f;
+  return group_ == LobeGroup::All ? p : restrictedTo(group_, p);
 }
 
 BsdfValue Bsdf::evaluateLayers(const Vec3& wi, bool reverse) const {
@@ -227,19 +136,20 @@ BsdfValue Bsdf::evaluateLayers(const Vec3& wi, bool reverse) const {
   if (wi.z > 0) {
     if (scatters(kLobeDiffuse)) {
       const float cosine = wi.z * kInvPi;
-      v.f = diffuse_ * (cosine * diffuseBelowSpecular(wi));
-      v.pdfW = select_.diffuse * cosine;
+      v.f = diffuse_ * (cosine * specular_.belowToward(wi));
+      v.pdfW = select_[kDiffuse] * cosine;
     }
-    if (scatters(kLobeSpecular | kLobeTransmission) && !smooth_) addReflection(wi, v);
+    if (scatters(SpecularLayer::kLobes) && !specular_.smooth()) specular_.addReflection(wi, select_[kSpecular], v);
   } else {
     if (scatters(kLobeDiffuseTransmission)) {
       const float cosine = -wi.z * kInvPi;
-      v.f = diffuseTransmission_ * (cosine * diffuseBelowSpecular(wi));
-      v.pdfW = select_.diffuseTransmission * cosine;
+      v.f = diffuseTransmission_ * (cosine * specular_.belowToward(wi));
+      v.pdfW = select_[kDiffuseTransmission] * cosine;
     }
-    if (scatters(kLobeTransmission) && !smooth_ && !passThrough_) addTransmission(wi, v);
+    if (scatters(kLobeTransmission) && !specular_.smooth() && !specular_.passesThrough())
+      specular_.addTransmission(wi, select_[kSpecular], v);
   }
-  if (has(kLobeSheen | kLobeClearcoat)) addLayers(wi, v);
+  if (has(Covers::kLobes)) addCovers(wi, v);
   if (reverse) {
     const Vec3 back = wi.z > 0 ? wo_ : Vec3(wo_.x, wo_.y, -wo_.z);
     v.pdfRevW = reversed(wi).evaluateLayers(back, false).pdfW;
@@ -247,10 +157,37 @@ BsdfValue Bsdf::evaluateLayers(const Vec3& wi, bool reverse) const {
   return v;
 }
 
+float Bsdf::belowCovers(const Vec3& wi) const {
+  float share = 1;
+  const bool coatedI = wi.z > 0 ? coatedHere_ : coatedThere_;
+  covers_.upward([&](const auto& cover, size_t) {
+    if (has(cover.kLobe)) share *= belowCover(cover, coatedHere_, coatedI, wi);
+  });
+  return share;
+}
+
+void Bsdf::addCovers(const Vec3& wi, BsdfValue& v) const {
+  const bool reflects = wi.z > 0 && coatedHere_, coatedI = wi.z > 0 ? coatedHere_ : coatedThere_;
+  covers_.upward([&](const auto& cover, size_t i) {
+    if (!has(cover.kLobe)) return;
+    v.f *= belowCover(cover, coatedHere_, coatedI, wi);
+    if (reflects && !cover.smooth() && scatters(cover.kLobe)) cover.add(wo_, wi, select_[kFirstCover + i], v);
+  });
+}
+
 bool Bsdf::sampleLayers(float uLobe, const Vec2& u, BsdfSample& out) const {
   out.delta = out.transmitted = out.straight = false;
   BsdfValue v;
-  if (!sampleDirection(uLobe, u, out, v)) return false;
+  constexpr std::array<size_t, kSlots> kOrder = pickingOrder();
+  bool found = false;
+  for (const size_t slot : kOrder) {
+    if (uLobe < select_[slot]) {
+      found = sampleSlot(slot, std::min(uLobe / select_[slot], kOneMinusEpsilon), u, out, v);
+      break;
+    }
+    uLobe -= select_[slot];
+  }
+  if (!found) return false;
   if (out.delta) return out.pdfW > 0;
   if (!microfacetOnly_) v = evaluateLayers(out.wi, false);
   if (!(v.pdfW > 0)) return false;
@@ -260,34 +197,34 @@ bool Bsdf::sampleLayers(float uLobe, const Vec2& u, BsdfSample& out) const {
   return true;
 }
 
-// Picks a lobe and a direction from it. Delta lobes fill in everything, microfacets on their own v, the others wi
-// alone.
-bool Bsdf::sampleDirection(float uLobe, const Vec2& u, BsdfSample& out, BsdfValue& v) const {
-  const auto take = [&uLobe](float probability) {
-    if (uLobe < probability) {
-      uLobe = std::min(uLobe / probability, kOneMinusEpsilon);
-      return true;
-    }
-    uLobe -= probability;
-    return false;
-  };
-  if (take(select_.specular)) return smooth_ ? sampleMirror(uLobe, out) : sampleMicrofacet(uLobe, u, out, v);
-  if (take(select_.clearcoat)) return sampleClearcoat(u, out);
-  if (take(select_.passThrough)) return samplePassThrough(out);
-  if (take(select_.diffuse)) {
-    out.wi = squareToCosineHemisphere(u);
+// A direction from a lobe. Delta lobes fill in everything, microfacets on their own v, the others wi alone.
+bool Bsdf::sampleSlot(size_t slot, float uLobe, const Vec2& u, BsdfSample& out, BsdfValue& v) const {
+  if (slot == kSpecular) {
+    if (!specular_.smooth())
+      return specular_.sampleMicrofacet(uLobe, u, select_[slot], out, microfacetOnly_ ? &v : nullptr);
+    specular_.sampleMirror(uLobe, select_[slot], out);
+    out.weight *= belowCovers(out.wi) / out.pdfW;
     return true;
   }
-  if (take(select_.diffuseTransmission)) {
+  if (slot == kPassThrough) return samplePassThrough(out);
+  if (slot < kFirstCover) {
     const Vec3 w = squareToCosineHemisphere(u);
-    out.wi = Vec3(w.x, w.y, -w.z);
+    out.wi = Vec3(w.x, w.y, slot == kDiffuse ? w.z : -w.z);
     return true;
   }
-  if (take(select_.sheen)) {
-    out.wi = squareToUniformHemisphere(u);
-    return true;
-  }
-  return false;
+  bool found = false;
+  covers_.upward([&](const auto& cover, size_t i) {
+    if (kFirstCover + i == slot) found = cover.sample(wo_, u, select_[slot], out);
+  });
+  return found;
+}
+
+bool Bsdf::samplePassThrough(BsdfSample& out) const {
+  out.delta = out.transmitted = true;
+  out.wi = specular_.passThroughDirection();
+  out.pdfW = select_[kPassThrough];
+  out.weight = specular_.transmission() * (specular_.passThroughShare() * belowCovers(out.wi) / out.pdfW);
+  return true;
 }
 
 }  // namespace braid

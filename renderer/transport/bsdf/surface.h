@@ -5,25 +5,13 @@
 #include <cstdint>
 
 #include "renderer/core/vec.h"
+#include "renderer/scene/data/lobes.h"
+#include "renderer/transport/bsdf/covers.h"
 
 namespace braid {
 
-// Which lobes a surface has. Anything not set is left out: no sampling, no evaluation, and its parameters may stay
-// uninitialised.
-enum LobeFlags : uint32_t {
-  kLobeDiffuse = 1u << 0,  // Lambertian reflection (1 - metallic)(1 - transmission)(1 - diffuseTransmission)
-  kLobeDiffuseTransmission = 1u << 1,  // Lambertian transmission
-  kLobeSpecular = 1u << 2,             // GGX reflection, dielectric and metal
-  kLobeTransmission = 1u << 3,         // GGX refraction, or straight-through when thin-walled
-  kLobeClearcoat = 1u << 4,
-  kLobeSheen = 1u << 5,
-  kLobeIridescence = 1u << 6,         // modifies the specular Fresnel term
-  kLobeAnisotropy = 1u << 7,          // modifies the specular distribution
-  kLobeSpecularGlossiness = 1u << 8,  // dielectric F0 given directly (specularF0), metallic is 0
-};
-
-struct SurfaceParameters {
-  uint32_t lobes = kLobeDiffuse;
+struct SurfaceParameters : Covers::Parameters {
+  uint32_t lobes = kLobeDiffuse;  // LobeFlags
   Spectrum baseColor{0.5f};
   float metallic = 0;
   float roughness = 1;  // perceptual, [0,1]
@@ -41,19 +29,15 @@ struct SurfaceParameters {
   float diffuseTransmission = 0;
   Spectrum diffuseTransmissionColor{1};
 
-  float clearcoat = 0;
-  float clearcoatRoughness = 0;
-  Vec3 clearcoatNormal{0, 0, 1};  // in the local shading frame
-
-  Spectrum sheenColor{0};
-  float sheenRoughness = 0;
-
   float anisotropy = 0;
   Vec2 anisotropyDirection{1, 0};  // unit, in the local tangent plane
 
   float iridescence = 0;
   float iridescenceIor = 1.3f;
   float iridescenceThickness = 400;  // nanometres
+
+  float metalShare() const { return (lobes & kLobeSpecular) && !(lobes & kLobeSpecularGlossiness) ? metallic : 0.0f; }
+  float transmissionShare() const { return lobes & kLobeTransmission ? transmission : 0.0f; }
 };
 
 }  // namespace braid

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "renderer/core/parallel.h"
 #include "renderer/transport/lights/light_tree.h"
 
 #include <algorithm>
 #include <array>
-#include <numeric>
+#include <span>
+
+#include "renderer/core/parallel.h"
 
 namespace braid {
 
@@ -62,6 +63,76 @@ float splitCost(const LightBounds& b, const Vec3& parentDiagonal, int dimension)
   return b.power * orientation * regular * area;
 }
 
+// Looks for the cheapest split of some lights into two, along the axes and between buckets of their centres.
+class SplitSearch {
+ public:
+  SplitSearch(const std::vector<LightBounds>& lights, std::span<const uint32_t> chosen)
+      : lights_(lights), chosen_(chosen) {
+    Bounds bounds;
+    for (const uint32_t light : chosen_) {
+      centres_.extend(lights_[light].bounds.centre());
+      bounds.extend(lights_[light].bounds);
+    }
+    extent_ = centres_.diagonal();
+    diagonal_ = bounds.diagonal();
+    for (int d = 0; d < 3; ++d)
+      if (extent_[d] > 0) tryDimension(d);
+  }
+  bool found() const { return dimension_ >= 0; }
+  bool below(uint32_t light) const { return bucketOf(light, dimension_) <= bucket_; }
+
+ private:
+  static constexpr int kBuckets = 12;
+
+  int bucketOf(uint32_t light, int dimension) const {
+    const float f = (lights_[light].bounds.centre()[dimension] - centres_.lo[dimension]) / extent_[dimension];
+    return std::clamp(static_cast<int>(f * kBuckets), 0, kBuckets - 1);
+  }
+
+  void tryDimension(int dimension) {
+    std::array<LightBounds, kBuckets> bucket, above;
+    for (const uint32_t light : chosen_) {
+      LightBounds& b = bucket[static_cast<size_t>(bucketOf(light, dimension))];
+      b = merge(b, lights_[light]);
+    }
+    above[kBuckets - 1] = bucket[kBuckets - 1];
+    for (size_t i = kBuckets - 1; i-- > 1;) above[i] = merge(bucket[i], above[i + 1]);
+    LightBounds below;
+    for (size_t i = 0; i + 1 < kBuckets; ++i) {
+      below = merge(below, bucket[i]);
+      if (below.bounds.empty() || above[i + 1].bounds.empty()) continue;
+      const float cost = splitCost(below, diagonal_, dimension) + splitCost(above[i + 1], diagonal_, dimension);
+      if (!(cost < best_)) continue;
+      best_ = cost;
+      dimension_ = dimension;
+      bucket_ = static_cast<int>(i);
+    }
+  }
+
+  const std::vector<LightBounds>& lights_;
+  std::span<const uint32_t> chosen_;
+  Bounds centres_;
+  Vec3 extent_, diagonal_;
+  float best_ = kInfinity;
+  int dimension_ = -1, bucket_ = 0;
+};
+
+// Sorts the lights of a node into its two children; the number of the left one's.
+size_t splitLights(const std::vector<LightBounds>& lights, std::span<uint32_t> order, int depth) {
+  // Deeper than any useful hierarchy: halves, so that the recursion ends.
+  constexpr int kMostDepth = 48;
+  size_t left = 0;
+  if (depth < kMostDepth) {
+    const SplitSearch search(lights, order);
+    if (search.found()) {
+      const auto split =
+          std::partition(order.begin(), order.end(), [&](uint32_t light) { return search.below(light); });
+      left = static_cast<size_t>(split - order.begin());
+    }
+  }
+  return left == 0 || left == order.size() ? order.size() / 2 : left;
+}
+
 // The share of the left one of two nodes. A node that may contribute keeps a chance worth a float's digits: the other,
 // however bright, may be hidden.
 float leftProbability(float left, float right) {
@@ -80,67 +151,22 @@ void LightTree::build(const std::vector<LightBounds>& lights) {
     if (lights[i].power > 0) order.push_back(i);
   if (order.empty()) return;
   nodes_.resize(2 * order.size() - 1);
-  buildNode(order, 0, order.size(), 0, lights, 0);
+  buildNode(lights, order, 0, 0);
   for (uint32_t i = 0; i < order.size(); ++i) position_[order[i]] = i;
 }
 
-LightBounds LightTree::buildNode(std::vector<uint32_t>& order, size_t begin, size_t end, size_t node,
-                                 const std::vector<LightBounds>& lights, int depth) {
-  const size_t count = end - begin;
+LightBounds LightTree::buildNode(const std::vector<LightBounds>& lights, std::span<uint32_t> order, size_t node,
+                                 int depth) {
   LightBounds total;
-  size_t middle = begin;
-  if (count == 1) {
-    total = lights[order[begin]];
+  size_t left = 0;
+  if (order.size() == 1) {
+    total = lights[order[0]];
   } else {
-    Bounds centroids, bounds;
-    for (size_t i = begin; i < end; ++i) {
-      centroids.extend(lights[order[i]].bounds.centre());
-      bounds.extend(lights[order[i]].bounds);
-    }
-    constexpr int kBuckets = 12;
-    const Vec3 extent = centroids.diagonal();
-    float best = kInfinity;
-    int bestDimension = -1, bestSplit = 0;
-    const auto bucketOf = [&](uint32_t light, int dimension) {
-      const float f = (lights[light].bounds.centre()[dimension] - centroids.lo[dimension]) / extent[dimension];
-      return std::clamp(static_cast<int>(f * kBuckets), 0, kBuckets - 1);
-    };
-    if (depth < 48) {
-      for (int d = 0; d < 3; ++d) {
-        if (!(extent[d] > 0)) continue;
-        std::array<LightBounds, kBuckets> bucket;
-        for (size_t i = begin; i < end; ++i) {
-          LightBounds& b = bucket[static_cast<size_t>(bucketOf(order[i], d))];
-          b = merge(b, lights[order[i]]);
-        }
-        std::array<LightBounds, kBuckets> above;
-        above[kBuckets - 1] = bucket[kBuckets - 1];
-        for (size_t i = kBuckets - 1; i-- > 1;) above[i] = merge(bucket[i], above[i + 1]);
-        LightBounds below;
-        for (size_t i = 0; i + 1 < kBuckets; ++i) {
-          below = merge(below, bucket[i]);
-          if (below.bounds.empty() || above[i + 1].bounds.empty()) continue;
-          const float cost = splitCost(below, bounds.diagonal(), d) + splitCost(above[i + 1], bounds.diagonal(), d);
-          if (cost < best) {
-            best = cost;
-            bestDimension = d;
-            bestSplit = static_cast<int>(i);
-          }
-        }
-      }
-    }
-    if (bestDimension >= 0) {
-      const auto split =
-          std::partition(order.begin() + static_cast<ptrdiff_t>(begin), order.begin() + static_cast<ptrdiff_t>(end),
-                         [&](uint32_t light) { return bucketOf(light, bestDimension) <= bestSplit; });
-      middle = static_cast<size_t>(split - order.begin());
-    }
-    if (middle == begin || middle == end) middle = begin + count / 2;
-    const size_t left = middle - begin;
+    left = splitLights(lights, order, depth);
     LightBounds l, r;
-    const auto buildLeft = [&] { l = buildNode(order, begin, middle, node + 1, lights, depth + 1); };
-    const auto buildRight = [&] { r = buildNode(order, middle, end, node + 2 * left, lights, depth + 1); };
-    if (count > 4096) {
+    const auto buildLeft = [&] { l = buildNode(lights, order.first(left), node + 1, depth + 1); };
+    const auto buildRight = [&] { r = buildNode(lights, order.subspan(left), node + 2 * left, depth + 1); };
+    if (order.size() > 4096) {
       parallelBoth(buildLeft, buildRight);
     } else {
       buildLeft();
@@ -157,8 +183,8 @@ LightBounds LightTree::buildNode(std::vector<uint32_t>& order, size_t begin, siz
   n.cosNormals = total.cosNormals;
   n.cosEmission = total.cosEmission;
   n.twoSided = total.twoSided;
-  n.leftLeaves = static_cast<uint32_t>(middle - begin);
-  n.light = count == 1 ? order[begin] : ~0u;
+  n.leftLeaves = static_cast<uint32_t>(left);
+  n.light = left == 0 ? order[0] : ~0u;
   return total;
 }
 

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "renderer/core/vec.h"
@@ -50,8 +51,8 @@ class LightTree {
     bool twoSided;
   };
   float importance(const Node& node, const Vec3& p, const Vec3& n, bool twoSided) const;
-  LightBounds buildNode(std::vector<uint32_t>& order, size_t begin, size_t end, size_t node,
-                        const std::vector<LightBounds>& lights, int depth);
+  // Builds the node of some lights and those below it; sorts `order` into the order of the leaves.
+  LightBounds buildNode(const std::vector<LightBounds>& lights, std::span<uint32_t> order, size_t node, int depth);
 
   std::vector<Node> nodes_;         // depth first: left child at +1, right child at +2·leftLeaves
   std::vector<uint32_t> position_;  // of each light among the leaves

@@ -19,6 +19,13 @@ uint32_t componentsOf(const Accessor& accessor);
 // Size of one element; columns of matrices start at multiples of four bytes.
 uint64_t elementBytes(const Accessor& accessor);
 
+// Whether its numbers can be indices.
+inline bool isIndex(const Accessor& a) {
+  return a.componentType == kU8 || a.componentType == kU16 || a.componentType == kU32;
+}
+// Reports accessors whose bytes are not there or not in order, and empties them.
+void validateAccessors(Document& document);
+
 // What readers do with integers: follow the accessor, or treat them as fractions whatever it says (colours, weights).
 enum class Integers { AsDeclared, AlwaysNormalized };
 

@@ -6,34 +6,17 @@
 
 #include <nlohmann/json.hpp>
 
+#include "renderer/scene/gltf/document/gltf_schema.h"
+
 namespace braid::gltf {
 
 namespace {
 
+// Beside those of materials, which gltf_schema.cpp lists.
 constexpr std::array kRendered = {
-    "EXT_mesh_gpu_instancing",
-    "EXT_meshopt_compression",
-    "EXT_texture_webp",
-    "KHR_draco_mesh_compression",
-    "KHR_lights_punctual",
-    "KHR_materials_anisotropy",
-    "KHR_materials_clearcoat",
-    "KHR_materials_diffuse_transmission",
-    "KHR_materials_dispersion",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_iridescence",
-    "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_sheen",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_unlit",
-    "KHR_materials_variants",
-    "KHR_materials_volume",
-    "KHR_mesh_quantization",
-    "KHR_meshopt_compression",
-    "KHR_node_visibility",
-    "KHR_texture_transform",
+    "EXT_mesh_gpu_instancing", "EXT_meshopt_compression", "EXT_texture_webp",      "KHR_draco_mesh_compression",
+    "KHR_lights_punctual",     "KHR_materials_variants",  "KHR_mesh_quantization", "KHR_meshopt_compression",
+    "KHR_node_visibility",     "KHR_texture_transform",
 };
 
 // No pixel depends on them: metadata, feature ids, outlines, levels of detail beside the finest, interaction, sound,
@@ -89,6 +72,12 @@ bool isIn(const List& list, const std::string& name) {
   return std::find(list.begin(), list.end(), name) != list.end();
 }
 
+bool isSupported(const std::string& name) {
+  const auto ofMaterials = materialExtensions();
+  return isIn(kRendered, name) || isIn(kHarmless, name) || name.empty() ||
+         std::any_of(ofMaterials.begin(), ofMaterials.end(), [&](const Field& f) { return f.name == name; });
+}
+
 std::vector<std::string> names(const nlohmann::json& root, const char* list) {
   const auto found = root.find(list);
   return found == root.end() ? std::vector<std::string>() : found->get<std::vector<std::string>>();
@@ -106,7 +95,7 @@ void checkExtensions(Document& document, const nlohmann::json& root) {
     if (name == "KHR_materials_dispersion" || (name == "KHR_animation_pointer" && document.options.frameTime))
       document.report.warn(place,
                            "extension " + quoted(name) + " is read but not rendered; the picture lacks its effect");
-    if (isIn(kRendered, name) || isIn(kHarmless, name) || name.empty()) continue;
+    if (isSupported(name)) continue;
     if (isIn(document.options.ignoredExtensions, name)) {
       document.report.warn(place, "extension " + quoted(name) + " is required but ignored, as --ignore-extension says");
       continue;
@@ -119,7 +108,7 @@ void checkExtensions(Document& document, const nlohmann::json& root) {
   if (!unsupported.empty()) throw SceneError(ExitCode::UnsupportedExtension, document.path, std::move(unsupported));
   std::string ignored;
   for (const std::string& name : names(root, "extensionsUsed")) {
-    if (isIn(kRendered, name) || isIn(kHarmless, name) || name.empty()) continue;
+    if (isSupported(name)) continue;
     document.extensionsIgnored.push_back(name);
     ignored += (ignored.empty() ? "" : ", ") + quoted(name);
   }

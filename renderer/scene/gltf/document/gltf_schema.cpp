@@ -284,4 +284,6 @@ constexpr Field kRoot[] = {{.name = "asset",
 
 std::span<const Field> rootShape() { return kRoot; }
 
+std::span<const Field> materialExtensions() { return kMaterialExtensions; }
+
 }  // namespace braid::gltf

@@ -34,6 +34,8 @@ struct Field {
 
 // The root object of a file.
 std::span<const Field> rootShape();
+// The extensions of materials, all of them rendered.
+std::span<const Field> materialExtensions();
 
 // Makes the JSON one that holds nothing but what the table allows, each deviation reported with its pointer: unknown
 // members are dropped, wrong ones are taken as absent or replaced as the table says, whole numbers become integers.
