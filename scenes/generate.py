@@ -12,12 +12,12 @@ import argparse
 import pathlib
 import sys
 
-from generator import basics, nature, refraction, rooms, showcase
+from generator import basics, nature, refraction, rooms, shelf, showcase
 from generator.check import Invalid, check
 
 SCENES = {build.__name__: build for build in (
     basics.furnace, basics.cornell, basics.plates,
-    rooms.bookshelf, rooms.interior, rooms.door_ajar,
+    shelf.bookshelf, rooms.interior, rooms.door_ajar,
     refraction.glass_of_water, refraction.pool, refraction.torus_glass,
     nature.hair, nature.foliage, nature.forest,
     showcase.many_lights, showcase.sun_sky, showcase.materials)}

@@ -64,7 +64,9 @@ bool renderBidirectionalPass(const PassRequest& request, PassTarget& target, Str
 void replayBidirectionalPixel(const PassRequest& request, int x, int y, StrategyObserver& observer) {
   const Pass pass(request);
   const PixelWindow& w = request.plan.window;
-  PassTarget target(w.width(), w.height(), true, request.plan.kept.features, request.plan.settings.transparent);
+  PassTarget target(
+      w.width(), w.height(),
+      {.splats = true, .features = request.plan.kept.features, .coverage = request.plan.settings.transparent});
   BidirectionalKernel(request, pass.shared(), target, &observer).render({{x, y}});
 }
 

@@ -39,7 +39,7 @@ class StrategyFilms final : public StrategyObserver {
 
  private:
   struct Film {
-    Film(int width, int height) : target(width, height, true, false), sum(width, height, 2) {}
+    Film(int width, int height) : target(width, height, {.splats = true}), sum(width, height, 2) {}
     PassTarget target;
     Accumulator sum;
   };
@@ -64,7 +64,8 @@ class StrategyFilms final : public StrategyObserver {
 std::vector<StrategyImage> renderStrategies(const TransportContext& context, const Plan& plan, uint64_t passes) {
   const LightPreparation preparation(context);
   StrategyFilms films(plan.window, preparation.splatFractionBits);
-  PassTarget target(plan.window.width(), plan.window.height(), true, plan.kept.features, plan.settings.transparent);
+  PassTarget target(plan.window.width(), plan.window.height(),
+                    {.splats = true, .features = plan.kept.features, .coverage = plan.settings.transparent});
   for (uint64_t pass = 0; pass < passes; ++pass) {
     target.clear();
     PassRequest request{context, plan, pass};

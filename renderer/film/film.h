@@ -34,12 +34,17 @@ struct FeatureSample {
   void setAlbedo(const Spectrum& value) { albedo = glm::clamp(value, Spectrum(0), Spectrum(1)); }
 };
 
+// What a pass writes besides the values of pixels.
+struct PassPlanes {
+  bool splats = false, features = false, coverage = false, bias = false;
+  bool direct = false;  // direct light by itself
+};
+
 // What an integrator writes during one pass. add() and features() belong to the task that owns the pixel; splat() may
 // be called by any thread for any pixel: integer sums commute, so the result does not depend on the order.
 class PassTarget {
  public:
-  PassTarget(int width, int height, bool splats, bool features, bool coverage = false, bool bias = false,
-             bool direct = false);
+  PassTarget(int width, int height, const PassPlanes& planes);
 
   int width() const { return width_; }
   int height() const { return height_; }

@@ -17,13 +17,13 @@ bool acceptable(const Spectrum& v) {
 
 }  // namespace
 
-PassTarget::PassTarget(int width, int height, bool splats, bool features, bool coverage, bool bias, bool direct)
+PassTarget::PassTarget(int width, int height, const PassPlanes& planes)
     : width_(width), height_(height), own_(width, height) {
-  if (splats) splats_.assign(3 * own_.size(), 0);
-  if (features) features_.assign(FeatureSample::kComponents, Plane<float>(width, height));
-  if (coverage) coverage_ = Plane<float>(width, height);
-  if (bias) bias_ = Rgb<float>(width, height);
-  if (direct) direct_ = Rgb<float>(width, height);
+  if (planes.splats) splats_.assign(3 * own_.size(), 0);
+  if (planes.features) features_.assign(FeatureSample::kComponents, Plane<float>(width, height));
+  if (planes.coverage) coverage_ = Plane<float>(width, height);
+  if (planes.bias) bias_ = Rgb<float>(width, height);
+  if (planes.direct) direct_ = Rgb<float>(width, height);
 }
 
 bool PassTarget::add(int x, int y, const Spectrum& value) {

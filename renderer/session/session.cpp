@@ -23,8 +23,12 @@ PassTarget makeTarget(const Plan& plan) {
     splats = splats || p.integrator->splats();
     bias = bias || p.integrator->estimatesBias();
   }
-  return PassTarget(plan.window.width(), plan.window.height(), splats, plan.kept.features, plan.settings.transparent,
-                    bias, plan.kept.directIndirect);
+  return PassTarget(plan.window.width(), plan.window.height(),
+                    {.splats = splats,
+                     .features = plan.kept.features,
+                     .coverage = plan.settings.transparent,
+                     .bias = bias,
+                     .direct = plan.kept.directIndirect});
 }
 
 }  // namespace

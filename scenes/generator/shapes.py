@@ -289,3 +289,18 @@ def sky_dome(radius, sun, opening, nu=48, nv=32):
     def uv(u, v, p):
         return (0.5, math.acos(max(-1, min(1, p[1] / radius))) / math.pi)
     return surface(nu, nv, point, uv, lambda u, v, p: mul(p, -1))
+
+
+def smooth(points, steps=4):
+    """Catmull-Rom curve through a lathe profile."""
+    out = []
+    for k in range(len(points) - 1):
+        p0, p1 = points[max(k - 1, 0)], points[k]
+        p2, p3 = points[k + 1], points[min(k + 2, len(points) - 1)]
+        for i in range(steps):
+            t = i / steps
+            out.append(tuple(0.5 * (
+                2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t * t
+                + (3 * b - a - 3 * c + d) * t ** 3)
+                for a, b, c, d in zip(p0, p1, p2, p3)))
+    return out + [points[-1]]

@@ -149,7 +149,7 @@ TEST_CASE("Sums of the parts are those of accumulators of their own, also of sha
   constexpr int kWidth = 20, kHeight = 12, kPasses = 10;
   Accumulator whole(kWidth, kHeight, 4), direct(kWidth, kHeight, 4), indirect(kWidth, kHeight, 4);
   DirectLightAccumulator parts(kWidth, kHeight, 4), later(kWidth, kHeight, 4);
-  PassTarget target(kWidth, kHeight, false, false, false, false, true);
+  PassTarget target(kWidth, kHeight, {.direct = true});
   std::mt19937 random(3);
   std::exponential_distribution<float> exponential;
   for (uint64_t pass = 0; pass < kPasses; ++pass) {

@@ -28,7 +28,7 @@ inline Accumulator uniformPasses(int width, int height, int buckets, uint64_t pa
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> u;
   Accumulator film(width, height, buckets);
-  PassTarget target(width, height, false, false);
+  PassTarget target(width, height, {});
   for (uint64_t pass = 0; pass < passes; ++pass) {
     target.clear();
     for (int y = 0; y < height; ++y)

@@ -15,7 +15,7 @@ namespace braid::test_film {
 using namespace test::film_passes;
 
 TEST_CASE("a rejected sample counts as zero") {
-  PassTarget target(3, 2, true, false);
+  PassTarget target(3, 2, {.splats = true});
   const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
   CHECK(target.add(0, 0, Spectrum(1, 2, 3)));
   CHECK_FALSE(target.add(1, 0, Spectrum(1, nan, 3)));
@@ -42,7 +42,7 @@ TEST_CASE("a rejected sample counts as zero") {
 TEST_CASE("buckets, halves and mean are what direct sums give") {
   for (int buckets : {2, 4}) {
     Accumulator film(5, 3, buckets);
-    PassTarget target(5, 3, false, false);
+    PassTarget target(5, 3, {});
     for (uint64_t pass = 0; pass < 11; ++pass) {
       for (int y = 0; y < 3; ++y)
         for (int x = 0; x < 5; ++x)
@@ -79,7 +79,7 @@ TEST_CASE("splats do not depend on order or threads") {
   };
   Rgb<float> result[2];
   for (size_t t : {0, 1}) {
-    PassTarget target(3, 2, true, false);
+    PassTarget target(3, 2, {.splats = true});
     splatAll(target, t == 0 ? 1 : 8);
     Accumulator film(3, 2, 2);
     film.commit(0, target);
@@ -90,7 +90,7 @@ TEST_CASE("splats do not depend on order or threads") {
 }
 
 TEST_CASE("large splats are clamped and counted, and never wrap") {
-  PassTarget target(1, 1, true, false);
+  PassTarget target(1, 1, {.splats = true});
   for (int i = 0; i < 600; ++i) target.splat(0, 0, Spectrum(1e9f, 4194304.0f, 1));
   CHECK(target.clampedSplats() == 600);
   Accumulator film(1, 1, 2);
@@ -104,7 +104,7 @@ TEST_CASE("the fixed point of splats follows the scale of the light") {
   Rgb<float> result[3];
   const int shifts[3] = {0, -30, 30};
   for (size_t k = 0; k < 3; ++k) {
-    PassTarget target(4, 4, true, false);
+    PassTarget target(4, 4, {.splats = true});
     target.setSplatFractionBits(32 - shifts[k]);
     for (int i = 0; i < 1000; ++i) {
       const float v = std::ldexp(0.37f + 1e-3f * static_cast<float>(i), shifts[k]);
@@ -144,7 +144,7 @@ TEST_CASE("a film made from its sums is the same film") {
 
 TEST_CASE("features: mean, halves and variance") {
   FeatureAccumulator film(2, 2);
-  PassTarget target(2, 2, false, true);
+  PassTarget target(2, 2, {.features = true});
   CHECK(target.wantsFeatures());
   for (uint64_t pass = 0; pass < 6; ++pass) {
     const float v = static_cast<float>(pass);

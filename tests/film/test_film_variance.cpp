@@ -41,7 +41,7 @@ Accumulator stratifiedPasses(int width, int height, uint64_t passes, unsigned se
     for (Plane<float>& p : s.channel)
       for (float& v : p.data) v = u(random);
   Accumulator film(width, height, 4);
-  PassTarget target(width, height, false, false);
+  PassTarget target(width, height, {});
   for (uint64_t pass = 0; pass < passes; ++pass) {
     const float point = radicalInverse(pass / 4);
     for (int y = 0; y < height; ++y)
@@ -145,7 +145,7 @@ TEST_CASE("low-discrepancy variance scales with the square of the light") {
   for (int k = 0; k < 2; ++k) {
     std::mt19937 random(11);
     std::uniform_real_distribution<float> u;
-    PassTarget target(40, 30, false, false);
+    PassTarget target(40, 30, {});
     for (uint64_t pass = 0; pass < 16; ++pass) {
       for (int y = 0; y < 30; ++y)
         for (int x = 0; x < 40; ++x) target.add(x, y, std::ldexp(u(random), k * -20) * Spectrum(1));
@@ -160,7 +160,7 @@ TEST_CASE("a black region beside fireflies keeps a variance of exactly zero") {
   Accumulator film(64, 40, 4);
   std::mt19937 random(13);
   std::uniform_real_distribution<float> u;
-  PassTarget target(64, 40, false, false);
+  PassTarget target(64, 40, {});
   for (uint64_t pass = 0; pass < 8; ++pass) {
     for (int y = 0; y < 40; ++y)
       for (int x = 0; x < 16; ++x) target.add(x, y, Spectrum(1e10f * u(random)));

@@ -217,7 +217,7 @@ TEST_CASE("After ten million stiff passes means and variances have a relative er
   const std::vector<Stream> list = streams();
   const int count = static_cast<int>(list.size());
   Accumulator parts(count * kParts, 1, 2);
-  PassTarget target(count * kParts, 1, false, false);
+  PassTarget target(count * kParts, 1, {});
   std::vector<ExactSums> exact;
   for (const Stream& s : list) exact.emplace_back(s.bits);
   std::vector<RunningSums> running(list.size());
@@ -260,7 +260,7 @@ TEST_CASE("Stiff pass values leave every plane of the film finite, in range, and
       CAPTURE(std::string(c.name));
       CAPTURE(buckets);
       Accumulator film(kWidth, kHeight, buckets);
-      PassTarget target(kWidth, kHeight, false, false);
+      PassTarget target(kWidth, kHeight, {});
       std::vector<PixelStatistics> expected(static_cast<size_t>(kWidth * kHeight));
       uint64_t rejected = 0, accepted = 0;
       for (uint64_t pass = 0; pass < kPassCount; ++pass) {
@@ -287,7 +287,7 @@ TEST_CASE("Stiff pass values leave every plane of the film finite, in range, and
 
 TEST_CASE("Halves that are equal have no variance between them, and the passes keep theirs") {
   Accumulator film(kWidth, kHeight, 2);
-  PassTarget target(kWidth, kHeight, false, false);
+  PassTarget target(kWidth, kHeight, {});
   for (uint64_t pass = 0; pass < kPassCount; ++pass) {
     for (int i = 0; i < kWidth * kHeight; ++i)
       target.add(i % kWidth, i / kWidth, Spectrum(randomUnit(pass / 2, static_cast<size_t>(i))));
@@ -306,7 +306,7 @@ TEST_CASE("Biases, features and coverage of stiff passes stay finite, and consta
   Accumulator film(kWidth, kHeight, 4, true);
   FeatureAccumulator features(kWidth, kHeight);
   CoverageAccumulator coverage(kWidth, kHeight);
-  PassTarget target(kWidth, kHeight, false, true, true, true);
+  PassTarget target(kWidth, kHeight, {.features = true, .coverage = true, .bias = true});
   const float nan = std::nanf("");
   for (uint64_t pass = 0; pass < kPassCount; ++pass) {
     for (int y = 0; y < kHeight; ++y)

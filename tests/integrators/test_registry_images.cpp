@@ -42,7 +42,7 @@ std::vector<MeanAndError> meansOfPasses(const Scene& scene, const Integrator& in
   settings.sampler = SamplerKind::Independent;
   const Plan plan = makePlan(scene, cameraOf(scene), settings, pointersTo(all));
   const TransportContext context(scene, settings.lightStrategy);
-  PassTarget target(settings.width, settings.height, integrator.splats(), plan.kept.features);
+  PassTarget target(settings.width, settings.height, {.splats = integrator.splats(), .features = plan.kept.features});
   std::vector<double> sum(15), squares(15);
   for (int pass = 0; pass < passes; ++pass) {
     target.clear();

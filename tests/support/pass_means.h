@@ -27,7 +27,7 @@ inline std::vector<Measured> passMeans(const Scene& scene, const Settings& setti
   const TransportContext context(scene, settings.lightStrategy);
   const Integrator& integrator = *plan.integrators.at(0).integrator;
   const auto preparation = integrator.prepare(context, plan);
-  PassTarget target(settings.width, settings.height, integrator.splats(), plan.kept.features);
+  PassTarget target(settings.width, settings.height, {.splats = integrator.splats(), .features = plan.kept.features});
   std::vector<double> sum, squares;
   for (uint64_t pass = 0; pass < settings.spp; ++pass) {
     target.clear();
@@ -72,7 +72,7 @@ inline Measured reportedOverEmpirical(const Scene& scene, const Settings& settin
   const TransportContext context(scene, settings.lightStrategy);
   const Integrator& integrator = *plan.integrators.at(0).integrator;
   const auto preparation = integrator.prepare(context, plan);
-  PassTarget target(settings.width, settings.height, integrator.splats(), plan.kept.features);
+  PassTarget target(settings.width, settings.height, {.splats = integrator.splats(), .features = plan.kept.features});
   std::vector<Rgb<float>> means, variances;
   for (plan.settings.seed = 0; plan.settings.seed < seeds; ++plan.settings.seed) {
     Accumulator film(settings.width, settings.height, plan.buckets());

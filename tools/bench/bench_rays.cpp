@@ -109,7 +109,8 @@ class RayBench {
         plan_(plan),
         accel_(accel),
         integrator_(*plan.integrators.front().integrator),
-        target_(plan.window.width(), plan.window.height(), integrator_.splats(), plan.kept.features),
+        target_(plan.window.width(), plan.window.height(),
+                {.splats = integrator_.splats(), .features = plan.kept.features}),
         film_(plan.window.width(), plan.window.height(), plan.buckets()) {
     integrator_.renderPass({context_, plan_, 0, nullptr, nullptr, &recorded_}, target_);
     shuffled_ = recorded_;

@@ -4,6 +4,7 @@
 // the class of a cover has: renderer/README.md, Adding a lobe.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <tuple>
 
@@ -48,8 +49,8 @@ struct CoverList : L... {
   }
   // Of each cover's class.
   static constexpr uint32_t kLobes = (L::kLobe | ... | 0u);
-  static constexpr uint32_t kLobe[] = {L::kLobe...};
-  static constexpr bool kAlwaysBroad[] = {L::kAlwaysBroad...};
+  static constexpr std::array<uint32_t, sizeof...(L)> kLobe{L::kLobe...};
+  static constexpr std::array<bool, sizeof...(L)> kAlwaysBroad{L::kAlwaysBroad...};
   template <class Point>
   static void read(const Point& point, uint32_t lobes, Parameters& p) {
     ((lobes & L::kLobe ? L::read(point, p) : void()), ...);
