@@ -114,11 +114,11 @@ void Report::throwIfBroken(const std::string& file, const Usage* usage) const {
 }
 
 std::vector<std::string> Report::lines(const Usage& usage, bool used) const {
-  struct Kind {
+  struct Row {
     const Flaw* first;
     uint64_t count = 0;
   };
-  std::vector<Kind> kinds;
+  std::vector<Row> kinds;
   std::map<std::string, size_t> index;
   for (const Flaw& f : flaws_) {
     if (usage.covers(f.place) != used) continue;
@@ -131,7 +131,7 @@ std::vector<std::string> Report::lines(const Usage& usage, bool used) const {
     kinds[entry->second].count += f.count;
   }
   std::vector<std::string> out;
-  for (const Kind& kind : kinds) {
+  for (const Row& kind : kinds) {
     std::string line = kind.first->place.empty() ? "" : kind.first->place + ": ";
     line += kind.first->text;
     if (!kind.first->meanwhile.empty()) line += "; meanwhile " + kind.first->meanwhile;
