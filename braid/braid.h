@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// braid as a library: load a scene, plan a render, run it, get named planes.
+// braid as a library: load a scene, plan a render, run it, combine what it estimated, get named planes.
 //
 // Errors are braid::Error exceptions (SceneError for scene files). Nothing is printed, nothing is global, and the
 // process is never ended. A Scene may be rendered by several threads at once.
@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "combiners/pipeline/pipeline.h"
 #include "renderer/core/error.h"
 #include "renderer/film/files/exr.h"
 #include "renderer/scene/data/gltf.h"
@@ -36,6 +37,10 @@ struct RenderPlan {
 RenderPlan plan(const Scene& scene, const Settings& settings);
 RenderPlan plan(const Scene& scene, const Settings& settings, const CameraData& camera);
 
+// Has the render keep what combine() will read for this method besides means, halves and variances. Without it most
+// methods still run, with less to go by.
+void keepFor(const std::string& method, RenderPlan& plan);
+
 struct Rendering : RenderResult {
   // Every plane by its channel name in braid's EXR files: "R", "Albedo.G", "N.X", "pt.mean.R", "pt.variance.B", …
   std::map<std::string, Plane<float>> planes;
@@ -44,5 +49,17 @@ struct Rendering : RenderResult {
 // Runs the plan; `progress` is called after each round of passes and ends the render by returning false, which keeps
 // what is done. writeExr(path, *r.estimates, r.image, …) saves the result.
 Rendering render(const Scene& scene, const RenderPlan& plan, const Session::ProgressCallback& progress = {});
+
+// The method, what it read, its image with halves, its estimated error, seconds.
+struct Combination : PipelineOutput {
+  // By channel name: "R", "G", "B"; "Error.Y", the estimated squared error, where the method knows it.
+  std::map<std::string, Plane<float>> planes;
+};
+
+// Denoises or combines the estimates by the method of a name as --combine has it: "auto", "nfor", "js@sppm"
+// (combiners/README.md lists them). Throws Error(Usage) for unknown names, Error(BadInput) with the reason where the
+// method cannot run on these estimates.
+Combination combine(const Estimates& estimates, const std::string& method = "auto",
+                    const PipelineOptions& options = {});
 
 }  // namespace braid

@@ -39,6 +39,9 @@ int main(int argc, char** argv) {
   for (const float v : full.planes.at("pt.mean.R").data) sum += static_cast<double>(v);
   check(sum > 0, "the image is not black");
 
+  const braid::Combination combined = braid::combine(*full.estimates);
+  check(combined.planes.at("R").size() == 32 * 32 && combined.planes.count("Error.Y") == 1, "auto combines a render");
+
   const braid::Rendering some = braid::render(*scene, plan, [](const braid::Progress& p) { return p.round < 2; });
   check(some.rounds == 2 && some.reason == braid::StopReason::Cancelled, "progress can end the render");
 

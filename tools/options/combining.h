@@ -50,9 +50,6 @@ void noteWhoAsked(const CLI::App& command, CombineChoice& choice);
 // kept: quarters, features, history, images for the stop of denoising. Throws Error(Usage) for unknown names.
 CombinePlan planCombining(const CombineChoice& choice, uint64_t samples, Plan& plan);
 
-// What there will be of the estimates after a render of so many samples (0: not known) by this plan.
-AvailableEstimates plannedEstimates(const Plan& plan, uint64_t samples);
-
 // "+ js: of pt and nfor" or "- curves: needs 3 checkpoints of pt, which has 2", a line for each step.
 std::string combinePlanText(const CombinePlan& combinePlan);
 

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "braid/plan_combining.h"
 #include "combiners/pipeline/pipeline_memory.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "braid/plan_combining.h"
 #include "tools/options/memory_limit.h"
 
 namespace braid {
