@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "braid/plan_combining.h"
+#include "combiners/denoise/oidn/oidn_networks.h"
 #include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/denoise_cutoff.h"
 #include "combiners/pipeline/registry.h"
@@ -76,6 +77,12 @@ void addCombineOptions(CLI::App& command, CombineChoice& c) {
             fmt::format("{} (default {})", infos[i].description, infos[i].fallback))
         ->check(numberOf(infos[i]))
         ->group(kMethodOptions);
+  command
+      .add_option_function<std::string>("--oidn-weights", nameOidnWeights,
+                                        "Folder of the weights of oidn, which are preferred to its library then "
+                                        "(default: BRAID_OIDN_WEIGHTS, or where tools/setup oidn puts them)")
+      ->type_name("DIR")
+      ->group(kMethodOptions);
 }
 
 void combineByDefault(CombineChoice& choice) {

@@ -5,7 +5,7 @@
 
 #include <doctest/doctest.h>
 
-#include "combiners/denoise/oidn.h"
+#include "combiners/denoise/oidn/oidn.h"
 #include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/external_method.h"
 #include "combiners/pipeline/pipeline.h"

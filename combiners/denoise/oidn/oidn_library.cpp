@@ -1,9 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Open Image Denoise, Intel's learned denoiser (https://www.openimagedenoise.org), where it is installed.
-//
-// Its own automatic exposure would couple all pixels and differ between the image, its halves and the perturbed images
-// of SURE; the inputs are exposure-normalised by the same rule already, so its scale is fixed at 1.
-#include "combiners/denoise/oidn.h"
+#include "combiners/denoise/oidn/oidn_library.h"
 
 #include <algorithm>
 #include <map>
@@ -13,8 +9,6 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 
-#include "combiners/pipeline/external_method.h"
-#include "combiners/pipeline/registry.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 
@@ -54,35 +48,29 @@ std::vector<float> interleaved(const Rgb<float>& planes, float lo, float hi) {
   return out;
 }
 
-// A device that is released at the end of the scope.
-class Device {
- public:
-  explicit Device(const OidnApi& api) : api_(api), device_(api.newDevice(kOidnCpuDevice)) {
-    if (device_) api_.commitDevice(device_);
-  }
-  ~Device() {
+}  // namespace
+
+OidnDevice::OidnDevice(const OidnApi& api) : api_(api), device_(api.newDevice(kOidnCpuDevice)) {
+  if (device_) api_.commitDevice(device_);
+  try {
+    check();
+  } catch (...) {
     if (device_) api_.releaseDevice(device_);
+    throw;
   }
-  Device(const Device&) = delete;
-  Device& operator=(const Device&) = delete;
+}
 
-  void check() const {
-    const char* message = nullptr;
-    const int code = api_.getDeviceError(device_, &message);
-    if (code != 0 || !device_)
-      throw Error(ExitCode::Internal, fmt::format("Open Image Denoise reports error {}: {}", code,
-                                                  message ? message : "it made no device"));
-  }
+OidnDevice::~OidnDevice() { api_.releaseDevice(device_); }
 
-  // `albedo` and `normal` may be null.
-  Rgb<float> denoise(const Rgb<float>& colour, const Rgb<float>* albedo, const Rgb<float>* normal) const;
+void OidnDevice::check() const {
+  const char* message = nullptr;
+  const int code = api_.getDeviceError(device_, &message);
+  if (code != 0 || !device_)
+    throw Error(ExitCode::Internal,
+                fmt::format("Open Image Denoise reports error {}: {}", code, message ? message : "it made no device"));
+}
 
- private:
-  const OidnApi& api_;
-  OidnApi::Handle device_;
-};
-
-Rgb<float> Device::denoise(const Rgb<float>& colour, const Rgb<float>* albedo, const Rgb<float>* normal) const {
+Rgb<float> OidnDevice::denoise(const Rgb<float>& colour, const Rgb<float>* albedo, const Rgb<float>* normal) const {
   const auto width = static_cast<size_t>(colour.width()), height = static_cast<size_t>(colour.height());
   constexpr float kLargest = 3e38f;
   std::vector<std::pair<const char*, std::vector<float>>> images;
@@ -108,47 +96,6 @@ Rgb<float> Device::denoise(const Rgb<float>& colour, const Rgb<float>* albedo, c
   return out;
 }
 
-class Oidn : public ExternalMethod {
- public:
-  Oidn(const OidnApi* api, std::string reason) : api_(api), reason_(std::move(reason)) {}
-  const char* name() const override { return "oidn"; }
-  const char* description() const override { return "Open Image Denoise, a learned denoiser, where it is installed"; }
-  MethodKind kind() const override { return MethodKind::Denoiser; }
-  Needs needs() const override {
-    Needs needs;
-    needs.passes = 1;
-    needs.helpful.features = needs.helpful.featureNoise = true;
-    needs.halves = needs.variance = false;
-    return needs;
-  }
-  // The library's own memory is not known.
-  MethodMemory memory(const MemoryCase& /*of*/) const override { return {96, 36}; }
-  std::string skipReason() const override { return api_ ? "" : reason_; }
-
-  // A half is denoised with that half of the features, so that it stays independent of the other one.
-  MethodResult run(const MethodInputs& in) const override {
-    if (!api_) throw Error(ExitCode::Usage, reason_);
-    const Device device(*api_);
-    device.check();
-    const FeaturePlanes<Rgb<float>>* albedo = in.features ? &in.features->albedo : nullptr;
-    const FeaturePlanes<Rgb<float>>* normal = in.features ? &in.features->normal : nullptr;
-    MethodResult result;
-    result.image.mean =
-        device.denoise(in.unbiased->mean, albedo ? &albedo->mean : nullptr, normal ? &normal->mean : nullptr);
-    for (int h = 0; h < 2; ++h)
-      if (!in.meanOnly && !in.unbiased->half[h].empty())
-        result.image.half[h] = device.denoise(in.unbiased->half[h], albedo ? &albedo->half[h] : nullptr,
-                                              normal ? &normal->half[h] : nullptr);
-    return result;
-  }
-
- private:
-  const OidnApi* api_;
-  std::string reason_;
-};
-
-}  // namespace
-
 const OidnApi* loadOidn(const std::string& file, std::string& reason) {
   static std::mutex mutex;
   static std::map<std::string, OidnApi> loaded;
@@ -166,16 +113,6 @@ const OidnApi* loadOidn(const std::string& file, std::string& reason) {
     if (library) reason = name + " lacks functions of Open Image Denoise 1 or 2";
   }
   return nullptr;
-}
-
-std::unique_ptr<Method> makeOidn(const OidnApi* api, const std::string& reason) {
-  return std::make_unique<Oidn>(api, reason);
-}
-
-std::unique_ptr<Method> make_oidn() {
-  std::string reason;
-  const OidnApi* api = loadOidn("", reason);
-  return makeOidn(api, reason);
 }
 
 }  // namespace braid

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The part of the C interface of Open Image Denoise that braid calls, as a table of functions: filled from the library
-// when it is found at run time, or by a test.
+// The library of Open Image Denoise (https://www.openimagedenoise.org), where it is installed: the part of its C
+// interface that braid calls, as a table of functions, filled from the library at run time, or by a test.
 #pragma once
 
 #include <cstddef>
-#include <memory>
 #include <string>
 
-#include "combiners/method.h"
+#include "renderer/core/plane.h"
 
 namespace braid {
 
@@ -35,7 +34,22 @@ inline constexpr int kOidnFloat3 = 3;
 // `reason` says why then. Loaded once a file and never unloaded.
 const OidnApi* loadOidn(const std::string& file, std::string& reason);
 
-// The denoiser by these functions; null: it cannot run for `reason`.
-std::unique_ptr<Method> makeOidn(const OidnApi* api, const std::string& reason);
+// A device of the library, released at the end of the scope.
+class OidnDevice {
+ public:
+  explicit OidnDevice(const OidnApi& api);
+  ~OidnDevice();
+  OidnDevice(const OidnDevice&) = delete;
+  OidnDevice& operator=(const OidnDevice&) = delete;
+
+  // `albedo` and `normal` may be null. Throws Error(Internal) with what the library says.
+  Rgb<float> denoise(const Rgb<float>& colour, const Rgb<float>* albedo, const Rgb<float>* normal) const;
+
+ private:
+  void check() const;
+
+  const OidnApi& api_;
+  OidnApi::Handle device_;
+};
 
 }  // namespace braid
