@@ -33,13 +33,6 @@ LightPreparation::LightPreparation(const TransportContext& context) : emission(c
   splatFractionBits = fractionBits(emission.power(), static_cast<double>(context.scene.traits().radius));
 }
 
-LightPreparation::Ref::Ref(const PassRequest& request) {
-  used_ = dynamic_cast<const LightPreparation*>(request.preparation);
-  if (used_) return;
-  own_ = std::make_unique<LightPreparation>(request.context);
-  used_ = own_.get();
-}
-
 Applies photonsApply(const SceneTraits& traits, const LightReach& reach) {
   if (!traits.has(kTraitEmissiveTriangles | kTraitPointLights | kTraitDirectionalLights))
     return {false, "only the environment lights the scene: camera paths find it"};

@@ -2,7 +2,7 @@
 // What integrators with light subpaths prepare once per render.
 #pragma once
 
-#include "renderer/session/integrator.h"
+#include "integrators/preparation_ref.h"
 #include "renderer/transport/light_emission.h"
 
 namespace braid {
@@ -12,16 +12,7 @@ struct LightPreparation : Preparation {
   LightEmission emission;
   int splatFractionBits = 32;  // PassTarget::setSplatFractionBits()
 
-  // The preparation of a request, or one of its own when it has none.
-  class Ref {
-   public:
-    explicit Ref(const PassRequest& request);
-    const LightPreparation* operator->() const { return used_; }
-
-   private:
-    std::unique_ptr<const LightPreparation> own_;
-    const LightPreparation* used_;
-  };
+  using Ref = PreparationRef<LightPreparation>;
 };
 
 // Whether photons find light that camera paths find by rare chance only: caustics.

@@ -21,6 +21,7 @@
 #include "combiners/shrinkage/shrinkage.h"
 #include "combiners/statistics/sure_map.h"
 #include "renderer/core/parallel.h"
+#include "renderer/film/make_attribute.h"
 
 namespace braid {
 
@@ -214,7 +215,7 @@ MethodResult Curves::run(const MethodInputs& in) const {
     blendChannel(evidence, channelWeights(evidence, c, in.options, points), gate, c, blend);
   MethodResult result = blend.finish(name(), sigma);
   const auto count = [&](const char* key, size_t value) {
-    result.remarks.push_back({key, Attribute::Kind::Int, "", static_cast<int64_t>(value), 0, {}});
+    result.remarks.push_back(wholeAttribute(key, static_cast<int64_t>(value)));
   };
   count("curvePoints", evidence.now.earlier.size() + 1);
   if (in.stopped) count("stoppedAfter", source.passes);

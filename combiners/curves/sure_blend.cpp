@@ -5,6 +5,7 @@
 
 #include "combiners/statistics/half_statistics.h"
 #include "renderer/core/error.h"
+#include "renderer/film/make_attribute.h"
 
 namespace braid {
 
@@ -31,7 +32,7 @@ SureBlend::SureBlend(const MethodInputs& in)
 
 MethodResult SureBlend::finish(const std::string& method, double filterSigma) {
   result.aovs.push_back({"weight." + method, std::move(share)});
-  result.remarks.push_back({"sureMapFilterSigma", Attribute::Kind::Float, "", 0, filterSigma, {}});
+  result.remarks.push_back(numberAttribute("sureMapFilterSigma", filterSigma));
   return std::move(result);
 }
 

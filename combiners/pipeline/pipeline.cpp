@@ -17,6 +17,7 @@
 #include "renderer/core/parallel.h"
 #include "renderer/core/pixel_buffer.h"
 #include "renderer/core/stopwatch.h"
+#include "renderer/film/make_attribute.h"
 
 namespace braid {
 
@@ -269,13 +270,6 @@ struct KeptPixels {
   ~KeptPixels() { dropKeptPixels(); }
 };
 
-Attribute textAttribute(const std::string& name, const std::string& value) {
-  Attribute a;
-  a.name = name;
-  a.text = value;
-  return a;
-}
-
 }  // namespace
 
 const PipelineOutput* PipelineResult::find(const std::string& name) const {
@@ -331,13 +325,7 @@ std::vector<Attribute> remarksOf(const PipelineOutput& output, bool timing) {
     remark.name = prefix + remark.name;
     list.push_back(remark);
   }
-  const auto number = [&](const char* name, double value) {
-    Attribute a;
-    a.name = prefix + name;
-    a.kind = Attribute::Kind::Float;
-    a.number = value;
-    list.push_back(a);
-  };
+  const auto number = [&](const char* name, double value) { list.push_back(numberAttribute(prefix + name, value)); };
   if (std::isfinite(output.meanOverUnbiased)) number("meanOverUnbiased", output.meanOverUnbiased);
   if (timing) {
     number("seconds", output.seconds);

@@ -18,6 +18,7 @@
 #include "combiners/pipeline/registry.h"
 #include "combiners/ensemble/relative_weights.h"
 #include "combiners/shrinkage/shrinkage.h"
+#include "renderer/film/make_attribute.h"
 
 namespace braid {
 
@@ -132,14 +133,6 @@ Targets targetsOf(const MethodInputs& in, const Estimate& y, const Rgb<float>& v
   return t;
 }
 
-Attribute number(const std::string& name, double value) {
-  Attribute a;
-  a.name = name;
-  a.kind = Attribute::Kind::Float;
-  a.number = value;
-  return a;
-}
-
 MethodResult JamesStein::run(const MethodInputs& in) const {
   const Estimate& x = *in.unbiased;
   const bool denoiseHalves = in.denoiseHalf && in.options.number(kOwnHalves) != 0;
@@ -184,7 +177,7 @@ MethodResult JamesStein::run(const MethodInputs& in) const {
   const char* const channels[3] = {"R", "G", "B"};
   for (size_t c = 0; c < 3; ++c)
     result.aovs.push_back({std::string("shrinkage.js.") + channels[c], std::move(full.factor[c])});
-  result.remarks.push_back(number(kConstant.name, settings.constant));
+  result.remarks.push_back(numberAttribute(kConstant.name, settings.constant));
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include "combiners/pixels/box_mean.h"
 #include "combiners/pixels/finite_float.h"
 #include "combiners/statistics/variance.h"
+#include "renderer/film/make_attribute.h"
 
 namespace braid {
 
@@ -49,7 +50,7 @@ double filterGroups(const MethodInputs& in, const OptionInfo& option, const Unco
                     MethodResult& result) {
   const double gamma = chosenGamma(in, option, groups);
   for (int h = 0; h < 2; ++h) result.image.half[h] = uncorrelatedFiltered(groups[h], gamma);
-  result.remarks.push_back({"gamma", Attribute::Kind::Float, "", 0, gamma, {}});
+  result.remarks.push_back(numberAttribute("gamma", gamma));
   return gamma;
 }
 

@@ -167,11 +167,4 @@ PhotonPreparation::PhotonPreparation(const TransportContext& context, const Plan
   aimed_ = true;
 }
 
-PhotonPreparation::Ref::Ref(const PassRequest& request) {
-  used_ = dynamic_cast<const PhotonPreparation*>(request.preparation);
-  if (used_) return;
-  own_ = std::make_unique<PhotonPreparation>(request.context, request.plan);
-  used_ = own_.get();
-}
-
 }  // namespace braid

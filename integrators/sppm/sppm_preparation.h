@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "integrators/preparation_ref.h"
 #include "integrators/sppm/sppm_photons.h"
 
 namespace braid {
@@ -19,16 +20,7 @@ class PhotonPreparation : public Preparation {
   // Whether lights are chosen by the pilot's findings; not where that would not pay.
   bool aimed() const { return aimed_; }
 
-  // The preparation of a request, or one of its own when it has none.
-  class Ref {
-   public:
-    explicit Ref(const PassRequest& request);
-    const PhotonPreparation* operator->() const { return used_; }
-
-   private:
-    std::unique_ptr<const PhotonPreparation> own_;
-    const PhotonPreparation* used_;
-  };
+  using Ref = PreparationRef<PhotonPreparation>;
 
  private:
   std::optional<LightEmission> emission_;

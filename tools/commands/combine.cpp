@@ -11,6 +11,7 @@
 #include "renderer/core/error.h"
 #include "renderer/film/files/exr.h"
 #include "renderer/film/files/picture.h"
+#include "renderer/film/make_attribute.h"
 #include "tools/options/cli.h"
 #include "tools/options/combining.h"
 #include "tools/images/estimates_file.h"
@@ -198,7 +199,7 @@ CombinePlan requireMethods(const Estimates& all, const std::vector<std::string>&
 // Writes the files; the warning, if there is one.
 std::string writeResult(const CombineOptions& o, const PipelineResult& result, Inputs& in) {
   Estimates& all = in.estimates;
-  const Attribute version{"Software", Attribute::Kind::String, std::string("braid ") + BRAID_VERSION, 0, 0, {}};
+  const Attribute version = textAttribute("Software", std::string("braid ") + BRAID_VERSION);
   const std::vector<Attribute> derived = std::move(all.attributes);
   all.attributes = {version};
   for (const std::vector<Attribute>& list : {estimateAttributes(all, !o.noTiming), derived, viewAttributes(in.head)})

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <set>
 
+#include "renderer/film/make_attribute.h"
 #include "renderer/film/planes.h"
 #include "tools/images/estimates_file.h"
 #include "tools/images/foreign_image.h"
@@ -141,14 +142,13 @@ Estimates readBraidImage(const ImageFile& file, const std::vector<std::string>& 
 }
 
 std::vector<Attribute> estimateAttributes(const Estimates& all, bool timing) {
-  using Kind = Attribute::Kind;
-  std::vector<Attribute> list{{"braid/seed", Kind::String, std::to_string(all.seed), 0, 0, {}}};
+  std::vector<Attribute> list{textAttribute("braid/seed", std::to_string(all.seed))};
   for (const Estimate& e : all.estimates) {
     const std::string prefix = "braid/" + e.name + "/";
-    list.push_back({prefix + "unbiased", Kind::Int, "", e.unbiased ? 1 : 0, 0, {}});
-    list.push_back({prefix + "correlation", Kind::String, toString(e.correlation), 0, 0, {}});
-    list.push_back({prefix + "passes", Kind::Int, "", static_cast<int64_t>(e.passes), 0, {}});
-    if (timing) list.push_back({prefix + "seconds", Kind::Float, "", 0, e.seconds, {}});
+    list.push_back(wholeAttribute(prefix + "unbiased", e.unbiased ? 1 : 0));
+    list.push_back(textAttribute(prefix + "correlation", toString(e.correlation)));
+    list.push_back(wholeAttribute(prefix + "passes", static_cast<int64_t>(e.passes)));
+    if (timing) list.push_back(numberAttribute(prefix + "seconds", e.seconds));
   }
   return list;
 }

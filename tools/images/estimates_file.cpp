@@ -10,6 +10,7 @@
 #include "combiners/pipeline/spatial_variance.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
+#include "renderer/film/make_attribute.h"
 #include "tools/images/braid_image.h"
 #include "tools/images/foreign_image.h"
 #include "tools/images/same_view.h"
@@ -38,7 +39,7 @@ void deriveStatistics(Estimates& all, const std::string& file, std::vector<std::
   Estimate& e = all.estimates.front();
   const bool noVariance = e.variance.empty(), noHalves = !complete(e.half);
   const auto tell = [&](const char* attribute, const char* text) {
-    all.attributes.push_back({fmt::format("braid/{}/{}", e.name, attribute), Attribute::Kind::String, text, 0, 0, {}});
+    all.attributes.push_back(textAttribute(fmt::format("braid/{}/{}", e.name, attribute), text));
     if (notes) notes->push_back(fmt::format("{}: {} of {}: {}", file, attribute, e.name, text));
   };
   if (noVariance) {

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "renderer/core/hash.h"
+#include "renderer/film/make_attribute.h"
 #include "renderer/session/integrator.h"
 #include "renderer/session/pixel_filter.h"
 #include "renderer/session/rendering_revision.h"
@@ -13,29 +14,6 @@
 namespace braid {
 
 namespace {
-
-Attribute text(const std::string& name, const std::string& value) {
-  Attribute a;
-  a.name = name;
-  a.text = value;
-  return a;
-}
-
-Attribute integer(const std::string& name, uint64_t value) {
-  Attribute a;
-  a.name = name;
-  a.kind = Attribute::Kind::Int;
-  a.integer = static_cast<int64_t>(value);
-  return a;
-}
-
-Attribute number(const std::string& name, double value) {
-  Attribute a;
-  a.name = name;
-  a.kind = Attribute::Kind::Float;
-  a.number = value;
-  return a;
-}
 
 Attribute matrix(const std::string& name, const Mat4& m) {
   Attribute a;
@@ -62,37 +40,37 @@ std::string varianceIs(const Plan& plan) {
 std::vector<Attribute> planAttributes(const Scene& scene, const Plan& plan, const std::string& isa) {
   const Settings& s = plan.settings;
   std::vector<Attribute> list{
-      text("Software", std::string("braid ") + BRAID_VERSION),
-      text("braid/version", BRAID_VERSION),
-      integer("braid/renderingRevision", static_cast<uint64_t>(kRenderingRevision)),
-      text("braid/build", BRAID_BUILD_FLAGS),
-      text("braid/isa", isa),
-      text("braid/scene", scene.data().file),
-      text("braid/sceneHash", hexString(scene.data().contentHash)),
-      integer("braid/warnings", scene.data().warnings.size()),
-      text("braid/plan", plan.text()),
-      text("braid/planHash", hexString(plan.hash())),
-      text("braid/seed", std::to_string(s.seed)),
-      text("braid/sampler", s.sampler == SamplerKind::Sobol ? "sobol" : "independent"),
-      text("braid/filter", toString(s.filter)),
-      integer("braid/maxDepth", static_cast<uint64_t>(s.maxDepth)),
-      text("braid/varianceIs", varianceIs(plan)),
+      textAttribute("Software", std::string("braid ") + BRAID_VERSION),
+      textAttribute("braid/version", BRAID_VERSION),
+      wholeAttribute("braid/renderingRevision", kRenderingRevision),
+      textAttribute("braid/build", BRAID_BUILD_FLAGS),
+      textAttribute("braid/isa", isa),
+      textAttribute("braid/scene", scene.data().file),
+      textAttribute("braid/sceneHash", hexString(scene.data().contentHash)),
+      wholeAttribute("braid/warnings", scene.data().warnings.size()),
+      textAttribute("braid/plan", plan.text()),
+      textAttribute("braid/planHash", hexString(plan.hash())),
+      textAttribute("braid/seed", std::to_string(s.seed)),
+      textAttribute("braid/sampler", s.sampler == SamplerKind::Sobol ? "sobol" : "independent"),
+      textAttribute("braid/filter", toString(s.filter)),
+      wholeAttribute("braid/maxDepth", s.maxDepth),
+      textAttribute("braid/varianceIs", varianceIs(plan)),
       matrix("worldToCamera", plan.camera.worldToCamera(scene.data().origin)),
       matrix("worldToNDC", plan.camera.worldToNdc(scene.data().origin)),
   };
-  if (s.clamp > 0) list.push_back(number("braid/clamp", static_cast<double>(s.clamp)));
-  if (!plan.unreachable.empty()) list.push_back(text(kUnreachableAttribute, plan.unreachable));
+  if (s.clamp > 0) list.push_back(numberAttribute("braid/clamp", static_cast<double>(s.clamp)));
+  if (!plan.unreachable.empty()) list.push_back(textAttribute(kUnreachableAttribute, plan.unreachable));
   return list;
 }
 
 std::vector<Attribute> passAttributes(const Estimates& estimates, double seconds, bool timing) {
   uint64_t rejected = 0;
   for (const Estimate& e : estimates.estimates) rejected += e.rejected;
-  std::vector<Attribute> list{integer("samplesPerPixel", estimates.estimates.front().passes),
-                              integer("braid/rejectedSamples", rejected)};
+  std::vector<Attribute> list{wholeAttribute("samplesPerPixel", estimates.estimates.front().passes),
+                              wholeAttribute("braid/rejectedSamples", rejected)};
   for (Attribute& a : estimateAttributes(estimates, timing))
     if (a.name != "braid/seed") list.push_back(std::move(a));
-  if (timing) list.push_back(number("renderTimeSeconds", seconds));
+  if (timing) list.push_back(numberAttribute("renderTimeSeconds", seconds));
   return list;
 }
 

@@ -16,6 +16,7 @@
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 #include "renderer/film/error_map.h"
+#include "renderer/film/make_attribute.h"
 #include "tools/options/syntax/help.h"
 #include "tools/options/syntax/option_checks.h"
 #include "tools/options/syntax/option_texts.h"
@@ -144,9 +145,8 @@ CombinedLayers::CombinedLayers(const PipelineResult& result, const std::vector<s
       const std::string prefix = "braid/" + e.name + "/";
       std::erase_if(estimates.attributes,
                     [&](const Attribute& a) { return a.name == prefix + "unbiased" || a.name == prefix + "passes"; });
-      estimates.attributes.push_back({prefix + "unbiased", Attribute::Kind::Int, "", 0, 0, {}});
-      estimates.attributes.push_back(
-          {prefix + "passes", Attribute::Kind::Int, "", static_cast<int64_t>(e.passes), 0, {}});
+      estimates.attributes.push_back(wholeAttribute(prefix + "unbiased", 0));
+      estimates.attributes.push_back(wholeAttribute(prefix + "passes", static_cast<int64_t>(e.passes)));
       estimates.estimates.push_back(std::move(e));
     }
     if (weights)
@@ -168,9 +168,8 @@ CombinedLayers::CombinedLayers(const PipelineResult& result, const std::vector<s
   }
   headline_ = &last->result.image.mean;
   if (!last->result.error.empty()) add("Error", nullptr, &last->result.error);
-  estimates.attributes.push_back(
-      {"braid/headline", Attribute::Kind::String, "combined." + layerName(last->step.name), 0, 0, {}});
-  estimates.attributes.push_back({"braid/exposure", Attribute::Kind::Float, "", 0, result.exposure, {}});
+  estimates.attributes.push_back(textAttribute("braid/headline", "combined." + layerName(last->step.name)));
+  estimates.attributes.push_back(numberAttribute("braid/exposure", result.exposure));
 }
 
 void CombinedLayers::add(const std::string& name, const Rgb<float>* image, const Plane<float>* plane) {

@@ -14,6 +14,7 @@
 #include "renderer/film/error_map.h"
 #include "renderer/film/files/output_file.h"
 #include "renderer/film/files/picture.h"
+#include "renderer/film/make_attribute.h"
 #include "tools/images/exr_metadata.h"
 #include "tools/options/syntax/help.h"
 #include "tools/options/syntax/option_checks.h"
@@ -187,8 +188,7 @@ WrittenImage writeImage(const ImageOutput& o, Estimates& estimates, const Plane<
     if (o.show) showImages(estimates, combined, wanted, o.show);
     const Stopwatch writing;
     written.error = headlineError(combined, wanted, estimates);
-    if (written.error)
-      estimates.attributes.push_back({"braid/estimatedError", Attribute::Kind::Float, "", 0, *written.error, {}});
+    if (written.error) estimates.attributes.push_back(numberAttribute("braid/estimatedError", *written.error));
     // CombinedLayers may move the estimates.
     const Rgb<float> first = headlineOf(combined, wanted) ? Rgb<float>() : estimates.estimates.front().mean;
     const CombinedLayers layers(combined, wanted, o.combine.weights, !o.noTiming, estimates);

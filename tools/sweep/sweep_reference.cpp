@@ -11,6 +11,7 @@
 #include "renderer/core/hash.h"
 #include "renderer/film/files/exr.h"
 #include "renderer/session/rendering_revision.h"
+#include "tools/images/braid_image.h"
 #include "tools/images/exr_metadata.h"
 
 namespace braid {
@@ -21,14 +22,8 @@ namespace {
   throw Error(ExitCode::BadInput, fmt::format("{}: is no reference for this sweep: {}", path, reason));
 }
 
-const Attribute* find(const ImageFile& file, const std::string& name) {
-  for (const Attribute& a : file.attributes)
-    if (a.name == name) return &a;
-  return nullptr;
-}
-
 std::string textOf(const ImageFile& file, const std::string& name) {
-  const Attribute* a = find(file, name);
+  const Attribute* a = findAttribute(file, name);
   return a ? a->text : std::string();
 }
 
@@ -45,7 +40,7 @@ bool sameMatrix(const Attribute* a, const Mat4& m) {
 
 // Why a file of braid shows other pixels than this braid would make; empty: it does not.
 std::string staleness(const ImageFile& file) {
-  const Attribute* revision = find(file, "braid/renderingRevision");
+  const Attribute* revision = findAttribute(file, "braid/renderingRevision");
   if (revision && revision->integer == kRenderingRevision) return "";
   return fmt::format("it was rendered at rendering revision {}, and this braid renders at {}",
                      revision ? std::to_string(revision->integer) : "0", kRenderingRevision);
@@ -53,14 +48,14 @@ std::string staleness(const ImageFile& file) {
 
 // What files of braid say about themselves must agree.
 void checkHeader(const ImageFile& file, const ReferenceFrame& frame, uint64_t firstSeed, uint64_t seeds) {
-  if (!sameMatrix(find(file, "worldToCamera"), frame.worldToCamera) ||
-      !sameMatrix(find(file, "worldToNDC"), frame.worldToNdc))
+  if (!sameMatrix(findAttribute(file, "worldToCamera"), frame.worldToCamera) ||
+      !sameMatrix(findAttribute(file, "worldToNDC"), frame.worldToNdc))
     refuse(file.path, "it was rendered with another camera; render it with the camera of the scene file");
   const std::string hash = textOf(file, "braid/sceneHash"), expected = hexString(frame.sceneHash);
   if (!hash.empty() && hash != expected)
     refuse(file.path,
            fmt::format("it shows another scene (content hash {} instead of {}); render it anew", hash, expected));
-  if (const Attribute* depth = find(file, "braid/maxDepth"); depth && depth->integer != frame.maxDepth)
+  if (const Attribute* depth = findAttribute(file, "braid/maxDepth"); depth && depth->integer != frame.maxDepth)
     refuse(file.path, fmt::format("it was rendered with --max-depth {}, the sweep uses {}; give both the same",
                                   depth->integer, frame.maxDepth));
   const std::string seed = textOf(file, "braid/seed");
@@ -77,13 +72,8 @@ std::string chooseEstimate(const ImageFile& file, const std::string& preferred) 
     return hasLayer(file, name + ".mean") && hasLayer(file, name + ".halfA") && hasLayer(file, name + ".halfB");
   };
   if (complete(preferred)) return preferred;
-  const std::string ending = ".mean.R";
-  for (const std::string& channel : file.channelNames) {
-    if (channel.size() <= ending.size() || channel.compare(channel.size() - ending.size(), ending.size(), ending) != 0)
-      continue;
-    const std::string name = channel.substr(0, channel.size() - ending.size());
+  for (const std::string& name : estimateNames(file))
     if (complete(name)) return name;
-  }
   return {};
 }
 
@@ -103,9 +93,9 @@ SweepReference toReference(const ImageFile& file, const std::string& integrator)
     r.passedOver = textOf(file, "braid/headline");
     r.image.half[0] = file.rgb(estimate + ".halfA");
     r.image.half[1] = file.rgb(estimate + ".halfB");
-    if (const Attribute* passes = find(file, "braid/" + estimate + "/passes"))
+    if (const Attribute* passes = findAttribute(file, "braid/" + estimate + "/passes"))
       r.spp = static_cast<uint64_t>(std::max<int64_t>(0, passes->integer));
-    if (const Attribute* seconds = find(file, "braid/" + estimate + "/seconds")) r.seconds = seconds->number;
+    if (const Attribute* seconds = findAttribute(file, "braid/" + estimate + "/seconds")) r.seconds = seconds->number;
   }
   r.contentHash = hashOf(r.image.mean);
   return r;
@@ -116,7 +106,7 @@ ImageFile readChecked(const std::string& path, const ReferenceFrame& frame, uint
   if (file.width != frame.width || file.height != frame.height)
     refuse(path, fmt::format("it has {}x{} pixels, the sweep renders {}x{}; give --size {}x{} or another reference",
                              file.width, file.height, frame.width, frame.height, file.width, file.height));
-  if (find(file, "braid/version")) checkHeader(file, frame, firstSeed, seeds);
+  if (findAttribute(file, "braid/version")) checkHeader(file, frame, firstSeed, seeds);
   return file;
 }
 
@@ -140,7 +130,7 @@ std::string referenceName(const ReferenceFrame& frame) {
 SweepReference readReference(const std::string& path, const ReferenceFrame& frame, const std::string& integrator,
                              uint64_t firstSeed, uint64_t seeds) {
   const ImageFile file = readChecked(path, frame, firstSeed, seeds);
-  if (find(file, "braid/version"))
+  if (findAttribute(file, "braid/version"))
     if (const std::string reason = staleness(file); !reason.empty()) refuse(path, reason + "; render it anew");
   return toReference(file, integrator);
 }

@@ -13,6 +13,7 @@
 #include "combiners/pipeline/registry.h"
 #include "renderer/core/error.h"
 #include "renderer/film/files/exr.h"
+#include "renderer/film/make_attribute.h"
 
 namespace braid {
 
@@ -91,7 +92,7 @@ MethodResult External::run(const MethodInputs& in) const {
   SanitiseReport report;
   // Files hold the units of the render; what methods see is exposure-normalised.
   e = normalised(e, in.options.number(kPipelineExposure), report);
-  if (filled > 0) result.remarks.push_back({"filledPixels", Attribute::Kind::Int, "", filled, 0, {}});
+  if (filled > 0) result.remarks.push_back(wholeAttribute("filledPixels", filled));
   return result;
 }
 

@@ -22,6 +22,7 @@
 #include "combiners/pipeline/registry.h"
 #include "renderer/core/error.h"
 #include "renderer/film/files/exr.h"
+#include "renderer/film/make_attribute.h"
 
 namespace braid {
 
@@ -193,8 +194,8 @@ MethodResult ExternalCommand::run(const MethodInputs& in) const {
   if (halves && !in.meanOnly)
     for (size_t h = 0; h < 2; ++h) e.half[h] = filter(in.unbiased->half[h]);
   const auto filled = static_cast<int64_t>(fillInvalid(e));
-  if (filled > 0) result.remarks.push_back({"filledPixels", Attribute::Kind::Int, "", filled, 0, {}});
-  result.remarks.push_back({"command", Attribute::Kind::String, command_, 0, 0, {}});
+  if (filled > 0) result.remarks.push_back(wholeAttribute("filledPixels", filled));
+  result.remarks.push_back(textAttribute("command", command_));
   return result;
 }
 

@@ -8,6 +8,7 @@
 #include "combiners/statistics/half_statistics.h"
 #include "combiners/pipeline/registry.h"
 #include "renderer/core/error.h"
+#include "renderer/film/make_attribute.h"
 
 namespace braid {
 
@@ -34,14 +35,6 @@ NforOptions optionsOf(const MethodInputs& in) {
   options.quarters = in.quarters;
   options.cancel = in.cancel;
   return options;
-}
-
-Attribute number(const OptionInfo& option, double value) {
-  Attribute a;
-  a.name = option.name;
-  a.kind = Attribute::Kind::Float;
-  a.number = value;
-  return a;
 }
 
 class Nfor : public Method {
@@ -74,11 +67,11 @@ class Nfor : public Method {
     result.aovs.push_back({"weight.nfor.wide", channelMean(share.width(), share.height(), [&](size_t i, size_t c) {
                              return static_cast<double>(share[c][i]);
                            })});
-    result.remarks = {number(kDemodulate, options.demodulate),
-                      number(kOffsets, options.offsets),
-                      number(kVariance, static_cast<double>(options.variance)),
-                      number(kStride, options.stride),
-                      number(kFireflies, options.removeFireflies),
+    result.remarks = {numberAttribute(kDemodulate.name, options.demodulate),
+                      numberAttribute(kOffsets.name, options.offsets),
+                      numberAttribute(kVariance.name, static_cast<double>(options.variance)),
+                      numberAttribute(kStride.name, options.stride),
+                      numberAttribute(kFireflies.name, options.removeFireflies),
                       filtered.report.attribute("nfor-regression")};
     return result;
   }

@@ -5,6 +5,7 @@
 #include "combiners/denoise/pw/pw1_filter.h"
 #include "combiners/denoise/pw/pw_method.h"
 #include "combiners/pipeline/registry.h"
+#include "renderer/film/make_attribute.h"
 
 namespace braid {
 

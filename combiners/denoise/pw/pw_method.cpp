@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "renderer/core/error.h"
+#include "renderer/film/make_attribute.h"
 
 namespace braid {
 
@@ -59,14 +60,6 @@ PatchWelchInput patchWelchInputOf(const MethodInputs& in, const std::string& met
 
 double thresholdOf(const MethodInputs& in, const OptionInfo& option) {
   return std::clamp(in.options.number(option), 0.1, 10.0);
-}
-
-Attribute numberAttribute(const std::string& name, double value) {
-  Attribute a;
-  a.name = name;
-  a.kind = Attribute::Kind::Float;
-  a.number = value;
-  return a;
 }
 
 MethodResult patchWelchResult(std::vector<Rgb<float>> images) {

@@ -20,9 +20,6 @@ PatchWelchInput patchWelchInputOf(const MethodInputs& in, const std::string& met
 // The threshold option of a method, kept in [0.1, 10].
 double thresholdOf(const MethodInputs& in, const OptionInfo& option);
 
-// A remark with a number.
-Attribute numberAttribute(const std::string& name, double value);
-
 // The filtered images, and halves where there are any, as a result.
 MethodResult patchWelchResult(std::vector<Rgb<float>> images);
 

@@ -5,6 +5,7 @@
 #include "combiners/statistics/half_statistics.h"
 #include "combiners/pipeline/registry.h"
 #include "renderer/core/error.h"
+#include "renderer/film/make_attribute.h"
 
 namespace braid {
 
@@ -67,13 +68,8 @@ class Rdfc : public Method {
                        : crossHalfErrorMap(result.image.half, e, meanVariance(e), result.image.mean);
     for (size_t k = 0; k < filtered.selection.size(); ++k)
       result.aovs.push_back({std::string("weight.rdfc.") + kCandidateNames[k], std::move(filtered.selection[k])});
-    for (const OptionInfo* option : {&kDemodulate, &kVariance, &kFireflies}) {
-      Attribute a;
-      a.name = option->name;
-      a.kind = Attribute::Kind::Float;
-      a.number = in.options.number(*option);
-      result.remarks.push_back(a);
-    }
+    for (const OptionInfo* option : {&kDemodulate, &kVariance, &kFireflies})
+      result.remarks.push_back(numberAttribute(option->name, in.options.number(*option)));
     return result;
   }
 };

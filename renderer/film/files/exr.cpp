@@ -16,6 +16,7 @@
 #include "renderer/core/parallel.h"
 #include "renderer/film/files/exr_rows.h"
 #include "renderer/film/files/output_file.h"
+#include "renderer/film/make_attribute.h"
 #include "renderer/images/image_codecs.h"
 #include "renderer/film/planes.h"
 
@@ -117,18 +118,16 @@ std::vector<ExrChannel> namedPlanes(const Estimates& estimates, const Rgb<float>
 
 namespace {
 
-Attribute text(const char* name, const char* value) { return {name, Attribute::Kind::String, value, 0, 0, {}}; }
-
 std::vector<Attribute> attributesOf(const Estimates& estimates) {
-  std::vector<Attribute> list{text("compression", "zip:1")};
+  std::vector<Attribute> list{textAttribute("compression", "zip:1")};
   // OpenImageIO adds the date of writing when there is none; files must reproduce byte for byte, and an empty date is
   // the way to have none.
-  list.push_back(text("DateTime", ""));
+  list.push_back(textAttribute("DateTime", ""));
   // R, G, B, white D65: x, y
   const std::vector<float> rec709 = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
   list.push_back({"chromaticities", Attribute::Kind::Chromaticities, "", 0, 0, rec709});
-  list.push_back(text("colorInteropID", "lin_rec709_scene"));
-  list.push_back(text("braid/varianceIs", "variance of the pixel mean"));
+  list.push_back(textAttribute("colorInteropID", "lin_rec709_scene"));
+  list.push_back(textAttribute("braid/varianceIs", "variance of the pixel mean"));
   for (const Attribute& a : estimates.attributes) {
     BRAID_ASSERT(a.kind != Attribute::Kind::Matrix || a.values.size() == 16);
     BRAID_ASSERT(a.kind != Attribute::Kind::Chromaticities || a.values.size() == 8);

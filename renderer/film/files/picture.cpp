@@ -9,6 +9,7 @@
 #include "renderer/core/parallel.h"
 #include "renderer/film/files/output_file.h"
 #include "renderer/film/files/srgb.h"
+#include "renderer/film/make_attribute.h"
 #include "renderer/images/image_codecs.h"
 
 namespace braid {
@@ -60,20 +61,15 @@ void write(const std::string& path, ImageFormat format, const ImageHeader& heade
   file.finish();
 }
 
-Attribute textAttribute(const char* name, const char* value) {
-  return {name, Attribute::Kind::String, value, 0, 0, {}};
-}
-Attribute number(const char* name, int value) { return {name, Attribute::Kind::Int, "", value, 0, {}}; }
-
 std::vector<Attribute> attributesOf(ImageFormat format, bool alpha) {
   const bool forEyes = format == ImageFormat::Png || format == ImageFormat::Jpeg;
   std::vector<Attribute> list{textAttribute("oiio:ColorSpace", forEyes ? "sRGB" : "Linear")};
   // OpenImageIO adds the date of writing when there is none; files must reproduce byte for byte.
   list.push_back(textAttribute("DateTime", ""));
-  if (alpha) list.push_back(number("oiio:UnassociatedAlpha", 1));
+  if (alpha) list.push_back(wholeAttribute("oiio:UnassociatedAlpha", 1));
   // Half the time of the usual level 6, for a hundredth more bytes.
-  if (format == ImageFormat::Png) list.push_back(number("png:compressionLevel", 4));
-  if (format == ImageFormat::Jpeg) list.push_back(number("CompressionQuality", 95));
+  if (format == ImageFormat::Png) list.push_back(wholeAttribute("png:compressionLevel", 4));
+  if (format == ImageFormat::Jpeg) list.push_back(wholeAttribute("CompressionQuality", 95));
   if (format == ImageFormat::Tiff) list.push_back(textAttribute("compression", "zip"));
   return list;
 }

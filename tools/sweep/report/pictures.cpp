@@ -6,6 +6,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
+#include "renderer/film/make_attribute.h"
 #include "renderer/images/image_codecs.h"
 #include "tools/metrics/tonemap.h"
 
@@ -77,8 +78,7 @@ std::string encode(const Picture& picture, const char* format, std::string& erro
   header.height = picture.height;
   header.type = SampleType::Byte;
   header.channels = {"R", "G", "B"};
-  header.attributes = {{"oiio:ColorSpace", Attribute::Kind::String, "sRGB", 0, 0, {}},
-                       {"Compression", Attribute::Kind::String, "jpeg:88", 0, 0, {}}};
+  header.attributes = {textAttribute("oiio:ColorSpace", "sRGB"), textAttribute("Compression", "jpeg:88")};
   MemorySink memory;
   const auto out = imageCodecs().create(format, std::string("picture.") + format, header, memory, error);
   if (out && out->writeImage(picture.rgb.data()) && out->close()) return memory.bytes();
