@@ -18,12 +18,17 @@ constexpr float kLargest = 1e18f;  // of means, and its square of variances: wha
 // longer over.
 constexpr float kLowestExponent = -60;
 
-// The distances of `count` pairs times k², at most `most`, summed over kChannels channels, to out[x], or added to it.
-// `p` and `q` are the first pixels of the two rows; a channel is its mean times k and its variance times k², in rows
-// `pitch` apart.
+// How far two pixels may count as apart: a distance times k² is at most `most`; `epsilon` goes to its denominator.
+struct DistanceLimits {
+  float epsilon, most;
+};
+
+// The distances of `count` pairs times k², summed over kChannels channels, to out[x], or added to it. `p` and `q` are
+// the first pixels of the two rows; a channel is its mean times k and its variance times k², in rows `pitch` apart.
 template <int kChannels, bool kAdd>
-void addDistances(const float* __restrict p, const float* __restrict q, size_t pitch, float epsilon, float most,
-                  int count, float* __restrict out) {
+void addDistances(const float* __restrict p, const float* __restrict q, size_t pitch, DistanceLimits limits, int count,
+                  float* __restrict out) {
+  const float epsilon = limits.epsilon, most = limits.most;
   for (int x = 0; x < count; ++x) {
     float sum = kAdd ? out[x] : 0.0f;
     for (int c = 0; c < kChannels; ++c) {
@@ -176,13 +181,13 @@ const float* NlmWeights::Guide::at(int x, int y) const {
 
 void NlmWeights::Guide::distances(int dx, int dy, int y, int x0, int count, float* out) const {
   const float *p = at(x0, y), *q = at(x0 + dx, y + dy);
-  const float most = squareK * kMaxDistance;
+  const DistanceLimits limits{epsilon, squareK * kMaxDistance};
   int c = 0;
   const auto next = [&]<int kChannels>(std::integral_constant<int, kChannels>) {
     if (c == 0)
-      addDistances<kChannels, false>(p, q, pitch, epsilon, most, count, out);
+      addDistances<kChannels, false>(p, q, pitch, limits, count, out);
     else
-      addDistances<kChannels, true>(p, q, pitch, epsilon, most, count, out);
+      addDistances<kChannels, true>(p, q, pitch, limits, count, out);
     c += kChannels;
     p += 2 * kChannels * pitch;
     q += 2 * kChannels * pitch;

@@ -11,6 +11,11 @@ namespace {
 constexpr int kTileWidth = 128, kTileHeight = 32;
 constexpr float kOne = 65535.0f;  // what a weight of 1 is stored as
 
+// Whole vectors: what lies past the end is the next row's, or the slack of the store.
+int wholeVectors(int count) {
+  return (count + WindowWeights::kRowSlack - 1) / WindowWeights::kRowSlack * WindowWeights::kRowSlack;
+}
+
 }  // namespace
 
 NlmWindowStore::NlmWindowStore(std::span<const NlmGuide> guides, int radius, int stride, const Rgb<float>* image,
@@ -66,14 +71,17 @@ void NlmWindowStore::storeOffset(const float* weights, int dx, int dy, const Pix
   }
 }
 
-void NlmWindowStore::row(int cx, int cy, int y, int x0, int x1, bool halfSensitivity, float* out) const {
+void NlmWindowStore::row(int cx, int cy, int y, int x0, int x1, float* out) const {
   const uint16_t* __restrict in = data_.get() + offset(cx / stride_, cy / stride_) +
                                   static_cast<size_t>((y - cy + radius_) * side_ + x0 - cx + radius_);
-  // Whole vectors: what lies past the end is the next row's, or the slack of the store.
-  const int count = (x1 - x0 + WindowWeights::kRowSlack - 1) / WindowWeights::kRowSlack * WindowWeights::kRowSlack;
+  const int count = wholeVectors(x1 - x0);
   float* __restrict to = out;
   for (int x = 0; x < count; ++x) to[x] = static_cast<float>(in[x]) * (1 / kOne);
-  if (!halfSensitivity) return;
+}
+
+void NlmWindowStore::halveSensitivity(int x0, int x1, float* out) {
+  const int count = wholeVectors(x1 - x0);
+  float* __restrict to = out;
   for (int x = 0; x < count; ++x) to[x] *= to[x];
   for (int x = 0; x < count; ++x) to[x] *= to[x];
 }

@@ -27,7 +27,9 @@ class NlmWindowStore {
                  std::array<Rgb<float>, 2>* zeroOrder = nullptr);
 
   // As WindowWeights::row(); (cx, cy) is a centre.
-  void row(int cx, int cy, int y, int x0, int x1, bool halfSensitivity, float* out) const;
+  void row(int cx, int cy, int y, int x0, int x1, float* out) const;
+  // Turns a row from x0 to x1 into that of half the sensitivity.
+  static void halveSensitivity(int x0, int x1, float* out);
 
  private:
   size_t offset(int column, int row) const {
@@ -50,7 +52,8 @@ class NlmWindowWeights final : public WindowWeights {
   NlmWindowWeights(const NlmWindowStore& store, bool halfSensitivity)
       : store_(store), halfSensitivity_(halfSensitivity) {}
   void row(int cx, int cy, int y, int x0, int x1, float* out) const override {
-    store_.row(cx, cy, y, x0, x1, halfSensitivity_, out);
+    store_.row(cx, cy, y, x0, x1, out);
+    if (halfSensitivity_) NlmWindowStore::halveSensitivity(x0, x1, out);
   }
 
  private:

@@ -131,15 +131,12 @@ void predict(const std::array<Windowed, kColumns>& columns, const NormalSolution
   }
 }
 
-void addPrediction(const float* __restrict w, const float* __restrict p0, const float* __restrict p1,
-                   const float* __restrict p2, float* __restrict total, float* __restrict red, float* __restrict green,
-                   float* __restrict blue) {
-  for (int x = 0; x < kSide; ++x) {
-    total[x] += w[x];
-    red[x] += w[x] * p0[x];
-    green[x] += w[x] * p1[x];
-    blue[x] += w[x] * p2[x];
-  }
+void addRow(const float* __restrict w, float* __restrict sum) {
+  for (int x = 0; x < kSide; ++x) sum[x] += w[x];
+}
+
+void addWeightedRow(const float* __restrict w, const float* __restrict value, float* __restrict sum) {
+  for (int x = 0; x < kSide; ++x) sum[x] += w[x] * value[x];
 }
 
 // All fits that reach into one tile. Their sums run in the order of the centres, row by row, in every tile.
@@ -264,8 +261,9 @@ class TileRegression {
     for (int row = std::max(y - kRadius, target_.y0); row < std::min(y + kRadius + 1, target_.y1); ++row) {
       const ptrdiff_t at = sumIndex(x - kRadius, row);
       const int from = (row - (y - kRadius)) * kSide;
-      addPrediction(weights_.v + from, prediction_[0].v + from, prediction_[1].v + from, prediction_[2].v + from,
-                    sums[0].data() + at, sums[1].data() + at, sums[2].data() + at, sums[3].data() + at);
+      addRow(weights_.v + from, sums[0].data() + at);
+      for (size_t c = 0; c < 3; ++c)
+        addWeightedRow(weights_.v + from, prediction_[c].v + from, sums[1 + c].data() + at);
     }
   }
 

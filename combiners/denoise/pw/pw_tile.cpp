@@ -24,17 +24,14 @@ void copyRow(const float* __restrict in, int count, float factor, float low, flo
   for (int x = 0; x < count; ++x) out[x] = factor * std::min(std::max(finiteOrZero(in[x]), low), high);
 }
 
-// What radiance is divided by. The albedo of a miss is the radiance of the environment, that of an emitter contains its
-// emission.
-void divisorRow(const float* __restrict r, const float* __restrict g, const float* __restrict b,
-                const float* __restrict depth, int count, float* __restrict dr, float* __restrict dg,
-                float* __restrict db) {
+// What a channel of the radiance is divided by, of its own albedo and those of the others. The albedo of a miss is the
+// radiance of the environment, that of an emitter contains its emission.
+void divisorRow(const float* __restrict own, const float* __restrict second, const float* __restrict third,
+                const float* __restrict depth, int count, float* __restrict out) {
   for (int x = 0; x < count; ++x) {
-    const float ar = finiteOrZero(r[x]), ag = finiteOrZero(g[x]), ab = finiteOrZero(b[x]);
-    const bool surface = std::max(std::max(ar, ag), ab) <= 1 && (!depth || depth[x] != 0);
-    dr[x] = surface ? std::max(ar, kMinAlbedo) : 1.0f;
-    dg[x] = surface ? std::max(ag, kMinAlbedo) : 1.0f;
-    db[x] = surface ? std::max(ab, kMinAlbedo) : 1.0f;
+    const float a = finiteOrZero(own[x]), b = finiteOrZero(second[x]), c = finiteOrZero(third[x]);
+    const bool surface = std::max(std::max(a, b), c) <= 1 && (!depth || depth[x] != 0);
+    out[x] = surface ? std::max(a, kMinAlbedo) : 1.0f;
   }
 }
 
@@ -112,8 +109,8 @@ void PatchWelchTile::storeFeatures(const Features& f, float depthScale, size_t f
   const float* z = f.depth.mean.empty() ? nullptr : &f.depth.mean[from];
   if (!f.albedo.mean.empty()) {
     const Rgb<float>& albedo = f.albedo.mean;
-    divisorRow(&albedo[0][from], &albedo[1][from], &albedo[2][from], z, count, &divisor[0][at], &divisor[1][at],
-               &divisor[2][at]);
+    for (size_t c = 0; c < 3; ++c)
+      divisorRow(&albedo[c][from], &albedo[(c + 1) % 3][from], &albedo[(c + 2) % 3][from], z, count, &divisor[c][at]);
     for (size_t c = 0; c < 3; ++c) copyRow(&albedo[c][from], count, kAlbedoScale, 0, 1, &guide[c][at]);
   }
   for (size_t c = 0; c < 3 && !f.normal.mean.empty(); ++c)

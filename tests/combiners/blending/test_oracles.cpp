@@ -28,13 +28,15 @@ void everywhere(const Rgb<float>& image, const Check& check) {
 }
 
 // Sum over a patch of 7x7 pixels of the squared distances of w a + (1 - w) b from the truth, relative to its level.
-double patchError(const Rgb<float>& a, const Rgb<float>& b, double w, const Case& c, size_t channel, int x, int y) {
+double patchError(const Rgb<float>& a, const Rgb<float>& b, double w, const Case& c, size_t channel,
+                  std::pair<int, int> at) {
+  const auto [x, y] = at;
   const Plane<float> roots = relativeErrorRoots(c.truth, Rgb<float>(c.truth.width(), c.truth.height()));
   double sum = 0;
   for (int j = std::max(0, y - 3); j <= std::min(c.truth.height() - 1, y + 3); ++j)
     for (int i = std::max(0, x - 3); i <= std::min(c.truth.width() - 1, x + 3); ++i) {
-      const auto at = [&](const Rgb<float>& image) { return static_cast<double>(image[channel].at(i, j)); };
-      sum += sqr((w * at(a) + (1 - w) * at(b) - at(c.truth)) * static_cast<double>(roots.at(i, j)));
+      const auto value = [&](const Rgb<float>& image) { return static_cast<double>(image[channel].at(i, j)); };
+      sum += sqr((w * value(a) + (1 - w) * value(b) - value(c.truth)) * static_cast<double>(roots.at(i, j)));
     }
   return sum;
 }
@@ -81,9 +83,9 @@ TEST_CASE("The ensemble in hindsight: its weights are the best of a grid for who
     const MethodResult result = findMethod("ensemble-oracle")->run(in);
     const Estimate &a = *in.bases[0], &b = *in.bases[1];
     const auto errorOf = [&](double w, size_t channel, int x, int y) {
-      if (!halves) return patchError(a.mean, b.mean, w, c, channel, x, y);
-      return 0.5 * (patchError(a.half[0], b.half[0], w, c, channel, x, y) +
-                    patchError(a.half[1], b.half[1], w, c, channel, x, y));
+      if (!halves) return patchError(a.mean, b.mean, w, c, channel, {x, y});
+      return 0.5 * (patchError(a.half[0], b.half[0], w, c, channel, {x, y}) +
+                    patchError(a.half[1], b.half[1], w, c, channel, {x, y}));
     };
     for (const auto& [x, y] : {std::pair(0, 0), {20, 15}, {39, 29}, {7, 22}})
       for (size_t channel = 0; channel < 3; ++channel) {
