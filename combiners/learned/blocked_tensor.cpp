@@ -2,33 +2,48 @@
 #include "combiners/learned/blocked_tensor.h"
 
 #include <algorithm>
+#include <type_traits>
 
 namespace braid {
 
 namespace {
 
-// The greater one; a value that is no number stays one.
-void mostOfFour(const float* above, const float* below, float* out, int block) {
-  for (int c = 0; c < block; ++c) {
-    const float one = std::max(above[c], above[block + c]), other = std::max(below[c], below[block + c]);
-    out[c] = std::max(one, other);
-  }
+// Calls body with the channels of a block as a constant, of the two that processors like.
+template <class Body>
+void withBlock(int block, const Body& body) {
+  if (block == 16)
+    body(std::integral_constant<int, 16>());
+  else if (block == 8)
+    body(std::integral_constant<int, 8>());
+  else
+    body(block);
 }
 
 }  // namespace
 
 void maxPool(const BlockedTensor& in, const BlockedTensor& out) {
-  for (int b = 0; b < out.blocks; ++b)
-    for (int y = out.region.y0; y < out.region.y1; ++y)
-      for (int x = out.region.x0; x < out.region.x1; ++x)
-        mostOfFour(in.at(b, 2 * x, 2 * y), in.at(b, 2 * x, 2 * y + 1), out.at(b, x, y), out.block);
+  withBlock(out.block, [&](auto block) {
+    for (int b = 0; b < out.blocks; ++b)
+      for (int y = out.region.y0; y < out.region.y1; ++y) {
+        const float *above = in.at(b, 2 * out.region.x0, 2 * y), *below = in.at(b, 2 * out.region.x0, 2 * y + 1);
+        float* to = out.at(b, out.region.x0, y);
+        for (int x = 0; x < out.region.width(); ++x, above += 2 * block, below += 2 * block, to += block)
+          for (int c = 0; c < block; ++c)
+            to[c] = std::max(std::max(above[c], above[c + block]), std::max(below[c], below[c + block]));
+      }
+  });
 }
 
-void upsample(const BlockedTensor& in, const BlockedTensor& out) {
-  for (int b = 0; b < out.blocks; ++b)
-    for (int y = out.region.y0; y < out.region.y1; ++y)
-      for (int x = out.region.x0; x < out.region.x1; ++x)
-        std::copy_n(in.at(b, x / 2, y / 2), out.block, out.at(b, x, y));
+void upsample(const BlockedTensor& in, const BlockedTensor& out, int first) {
+  withBlock(out.block, [&](auto block) {
+    for (int b = 0; b < in.blocks; ++b)
+      for (int y = out.region.y0; y < out.region.y1; ++y) {
+        float* to = out.at(first + b, out.region.x0, y);
+        const float* row = in.at(b, in.region.x0, y / 2);
+        for (int x = out.region.x0; x < out.region.x1; ++x, to += block)
+          std::copy_n(row + (x / 2 - in.region.x0) * block, block, to);
+      }
+  });
 }
 
 void copyBlocks(const BlockedTensor& in, const BlockedTensor& out, int first) {

@@ -19,10 +19,10 @@ struct BlockedTensor {
   }
 };
 
-// Each fills the whole region of `out`, of which `in` holds what is needed.
+// Each fills the whole region of `out`, of which `in` holds what is needed; the last two those blocks of it from
+// `first` on that `in` has.
 void maxPool(const BlockedTensor& in, const BlockedTensor& out);
-void upsample(const BlockedTensor& in, const BlockedTensor& out);
-// Into the blocks of `out` from `first` on.
+void upsample(const BlockedTensor& in, const BlockedTensor& out, int first);
 void copyBlocks(const BlockedTensor& in, const BlockedTensor& out, int first);
 
 // A row of `channels` values a pixel from the left end of the region on; the channels beyond become zeros.

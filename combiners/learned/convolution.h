@@ -8,6 +8,7 @@
 #pragma once
 
 #include <compare>
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <vector>
@@ -29,12 +30,17 @@ struct ConvolutionSize {
   auto operator<=>(const ConvolutionSize&) const = default;
 };
 
+// What a convolution takes for its own use while it runs, at most.
+constexpr size_t kConvolutionScratch = size_t(10) << 20;
+
 // For one size. Runs in the calling thread alone; several threads may call it at once.
 class Convolution {
  public:
   virtual ~Convolution() = default;
+  // So many values, aligned like pixels, it wants for its own use in run().
+  virtual size_t scratchValues() const = 0;
   // False: the library failed.
-  virtual bool run(const float* in, float* out) const = 0;
+  virtual bool run(const float* in, float* out, float* scratch) const = 0;
 };
 
 // With its weights in the order that the library likes.
@@ -43,6 +49,8 @@ class ConvolutionLayer {
   virtual ~ConvolutionLayer() = default;
   // For one thread at a time. Null: `error` says why.
   virtual std::unique_ptr<Convolution> prepare(const ConvolutionSize& size, std::string& error) = 0;
+  // Of the weights, in all orders that were prepared.
+  virtual size_t bytes() const = 0;
 };
 
 class ConvolutionLibrary {

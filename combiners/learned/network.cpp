@@ -50,6 +50,15 @@ NetworkGraph::Tensor madeBy(const NetworkLayer& layer, const std::vector<Network
   return out;
 }
 
+void findJoined(const Network& network, NetworkGraph& graph) {
+  graph.joined.assign(graph.tensors.size(), false);
+  for (size_t l = 0; l + 1 < network.layers.size(); ++l)
+    graph.joined[l + 1] = network.layers[l].kind == LayerKind::Upsample;
+  for (size_t l = 0; l < network.layers.size(); ++l)
+    for (const size_t in : graph.inputs[l])
+      if (network.layers[l].kind != LayerKind::Concatenate) graph.joined[in] = false;
+}
+
 }  // namespace
 
 NetworkGraph graphOf(const Network& network) {
@@ -73,6 +82,7 @@ NetworkGraph graphOf(const Network& network) {
     if (!numbers.emplace(layer.name, graph.tensors.size() - 1).second) fail(layer, "a second one of this name");
   }
   if (graph.tensors.back().level != 0) fail(network.layers.back(), "the output has fewer pixels than the image");
+  findJoined(network, graph);
   return graph;
 }
 

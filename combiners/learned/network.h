@@ -44,7 +44,9 @@ struct NetworkGraph {
   };
   std::vector<Tensor> tensors;
   std::vector<std::vector<size_t>> inputs;  // of each layer
-  int levels = 0;                           // the highest level: images have a multiple of 2^levels pixels
+  // Of each tensor: made by upsampling and read by concatenation only, so that it is made there and takes no memory.
+  std::vector<bool> joined;
+  int levels = 0;  // the highest level: images have a multiple of 2^levels pixels
 };
 
 // Throws Error(BadInput) naming the layer that is wrong.

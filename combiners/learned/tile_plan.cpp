@@ -77,7 +77,7 @@ std::vector<size_t> lastReads(const NetworkGraph& graph) {
   std::vector<size_t> last(graph.tensors.size(), 0);
   for (size_t t = 1; t < last.size(); ++t) last[t] = t - 1;
   for (size_t l = 0; l < graph.inputs.size(); ++l)
-    for (const size_t in : graph.inputs[l]) last[in] = l;
+    for (const size_t in : graph.inputs[l]) last[graph.joined[in] ? graph.inputs[in - 1][0] : in] = l;
   last.back() = graph.inputs.size();
   return last;
 }
@@ -97,7 +97,7 @@ void placeTensors(const NetworkGraph& graph, TilePlan& plan) {
       if (tensor.offset + tensor.values <= other.offset) break;
       tensor.offset = other.offset + other.values;
     }
-    alive.insert(before, t);
+    if (tensor.values > 0) alive.insert(before, t);
     plan.values = std::max(plan.values, tensor.offset + tensor.values);
   }
 }
@@ -135,7 +135,7 @@ TilePlan planTile(const Network& network, const NetworkGraph& graph, const TileR
   for (size_t t = 0; t < plan.tensors.size(); ++t) {
     TilePlan::Tensor& tensor = plan.tensors[t];
     tensor.blocks = slots[t].back() / block + 1;
-    tensor.values = tensor.region.pixels() * static_cast<size_t>(tensor.blocks * block);
+    if (!graph.joined[t]) tensor.values = tensor.region.pixels() * static_cast<size_t>(tensor.blocks * block);
   }
   placeTensors(graph, plan);
   return plan;

@@ -7,6 +7,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
+#include "renderer/core/pixel_buffer.h"
 
 namespace braid {
 
@@ -95,26 +96,20 @@ size_t TiledNetwork::threadBytes(int width, int height) const {
   const TileRegion image = padded(width, height);
   size_t values = 0;
   for (const TileRegion& tile : tiles(image)) values = std::max(values, plan(tile, image).values);
-  return values * sizeof(float);
+  return values * sizeof(float) + kConvolutionScratch;
 }
 
 size_t TiledNetwork::sharedBytes() const {
-  const std::vector<std::vector<int>> slots = channelSlots(network_, graph_, block_);
-  size_t values = 0;
-  for (size_t l = 0; l < layers_.size(); ++l) {
-    const NetworkLayer& layer = network_.layers[l];
-    if (layer.kind == LayerKind::Convolution)
-      values += static_cast<size_t>(roundedUp(slots[graph_.inputs[l][0]].back() + 1, block_) *
-                                    roundedUp(layer.outputs, block_) * layer.kernel * layer.kernel);
-  }
-  return values * sizeof(float);
+  size_t bytes = 0;
+  for (const Layer& layer : layers_)
+    if (layer.convolution) bytes += layer.convolution->bytes();
+  return bytes;
 }
 
 void TiledNetwork::run(const NetworkImage& image) {
   const TileRegion all = padded(image.width, image.height);
   const std::vector<TileRegion> list = tiles(all);
   parallelFor(list.size(), [&](size_t i) { runTile(list[i], all, image); });
-  unused_.clear();
 }
 
 const Convolution& TiledNetwork::prepared(size_t layer, const ConvolutionSize& size) {
@@ -128,27 +123,10 @@ const Convolution& TiledNetwork::prepared(size_t layer, const ConvolutionSize& s
   return *convolution;
 }
 
-PixelBuffer<float> TiledNetwork::takeMemory(size_t values) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (!unused_.empty()) {
-      PixelBuffer<float> memory = std::move(unused_.back());
-      unused_.pop_back();
-      if (memory.size() >= values) return memory;
-    }
-  }
-  return {values, kUnfilled};
-}
-
-void TiledNetwork::giveMemory(PixelBuffer<float> memory) {
-  const std::lock_guard lock(mutex_);
-  unused_.push_back(std::move(memory));
-}
-
 void TiledNetwork::runTile(const TileRegion& tile, const TileRegion& all, const NetworkImage& image) {
   const auto cancelled = [&] { return image.cancel && image.cancel->load(); };
   const TilePlan planned = plan(tile, all);
-  PixelBuffer<float> memory = takeMemory(planned.values);
+  PixelBuffer<float> memory(planned.values, kUnfilled);
   const auto tensor = [&](size_t t) {
     const TilePlan::Tensor& placed = planned.tensors[t];
     return BlockedTensor{memory.data() + placed.offset, placed.region, placed.blocks, block_};
@@ -156,7 +134,6 @@ void TiledNetwork::runTile(const TileRegion& tile, const TileRegion& all, const 
   readInput(tensor(0), image);
   for (size_t l = 0; l < layers_.size() && !cancelled(); ++l) runLayer(l, planned, memory.data());
   if (!cancelled()) writeOutput(tensor(planned.tensors.size() - 1), tile, image);
-  giveMemory(std::move(memory));
 }
 
 void TiledNetwork::runLayer(size_t l, const TilePlan& planned, float* memory) {
@@ -166,22 +143,28 @@ void TiledNetwork::runLayer(size_t l, const TilePlan& planned, float* memory) {
   };
   const NetworkLayer& layer = network_.layers[l];
   const BlockedTensor in = tensor(graph_.inputs[l][0]), out = tensor(l + 1);
-  if (out.region.pixels() == 0) return;
-  int first = 0;
   switch (layer.kind) {
-    case LayerKind::Convolution:
-      if (!prepared(l, planned.sizes[l]).run(in.values, out.values))
+    case LayerKind::Convolution: {
+      if (out.region.pixels() == 0) break;
+      const Convolution& convolution = prepared(l, planned.sizes[l]);
+      PixelBuffer<float> scratch(convolution.scratchValues(), kUnfilled);
+      if (!convolution.run(in.values, out.values, scratch.data()))
         throw Error(ExitCode::Internal, fmt::format("layer {}: the library of convolutions failed", layer.name));
       break;
+    }
     case LayerKind::MaxPool:
       maxPool(in, out);
       break;
     case LayerKind::Upsample:
-      upsample(in, out);
+      if (!graph_.joined[l + 1]) upsample(in, out, 0);
       break;
     case LayerKind::Concatenate:
+      int first = 0;
       for (const size_t t : graph_.inputs[l]) {
-        copyBlocks(tensor(t), out, first);
+        if (graph_.joined[t])
+          upsample(tensor(graph_.inputs[t - 1][0]), out, first);
+        else
+          copyBlocks(tensor(t), out, first);
         first += planned.tensors[t].blocks;
       }
       break;

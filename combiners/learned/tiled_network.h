@@ -9,11 +9,9 @@
 #include <memory>
 #include <mutex>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "combiners/learned/blocked_tensor.h"
-#include "renderer/core/pixel_buffer.h"
 
 namespace braid {
 
@@ -39,7 +37,7 @@ class TiledNetwork {
   // where the library fails.
   void run(const NetworkImage& image);
 
-  // Bytes that each thread takes for an image of this size, and that all share.
+  // Bytes that each thread takes for an image of this size, and that all share, once it has run.
   size_t threadBytes(int width, int height) const;
   size_t sharedBytes() const;
   // Whole tiles are so wide and high at most.
@@ -60,15 +58,12 @@ class TiledNetwork {
   void runLayer(size_t layer, const TilePlan& plan, float* memory);
   void readInput(const BlockedTensor& input, const NetworkImage& image) const;
   void writeOutput(const BlockedTensor& output, const TileRegion& tile, const NetworkImage& image) const;
-  PixelBuffer<float> takeMemory(size_t values);
-  void giveMemory(PixelBuffer<float> memory);
 
   Network network_;
   NetworkGraph graph_;
   int block_, side_ = 0;
   std::vector<Layer> layers_;
-  std::mutex mutex_;                        // of what follows and of what is prepared
-  std::vector<PixelBuffer<float>> unused_;  // memory of tiles that are done
+  std::mutex mutex_;  // of what is prepared
 };
 
 // The widest whole tile whose memory is within `tileBytes`; never less than one pixel of the highest level.

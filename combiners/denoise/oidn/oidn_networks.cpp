@@ -10,6 +10,7 @@
 #include "combiners/denoise/oidn/oidn_transfer.h"
 #include "combiners/denoise/oidn/oidn_unet.h"
 #include "renderer/core/error.h"
+#include "renderer/core/parallel.h"
 
 namespace braid {
 
@@ -28,6 +29,15 @@ std::string& namedFolder() {
 std::string variable(const char* name) {
   const char* value = std::getenv(name);
   return value ? value : "";
+}
+
+Rgb<float> encodedRadiance(const Rgb<float>& colour) {
+  Rgb<float> encoded(colour.width(), colour.height());
+  for (size_t c = 0; c < 3; ++c)
+    parallelChunks(colour.size(), kPixelChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) encoded[c][i] = oidnEncoded(colour[c][i]);
+    });
+  return encoded;
 }
 
 Network readNetwork(const fs::path& file) {
@@ -65,9 +75,6 @@ void OidnNetworks::encodeRow(const Input& input, int y, int x0, int x1, float* r
     const float* from = &plane.at(x0, y);
     float* to = row + c;
     for (int x = x0; x < x1; ++x, ++from, to += step) switch (input.encoding) {
-        case Encoding::Radiance:
-          *to = oidnEncoded(*from);
-          break;
         case Encoding::Albedo:
           *to = within(*from, 0, 1);
           break;
@@ -109,7 +116,9 @@ Rgb<float> OidnNetworks::filtered(const std::string& name, const std::vector<Inp
 }
 
 Rgb<float> OidnNetworks::denoise(const Rgb<float>& colour, const Rgb<float>* albedo, const Rgb<float>* normal) {
-  std::vector<Input> inputs{{&colour, Encoding::Radiance}};
+  // Once, not in every tile that reads a pixel.
+  const Rgb<float> radiance = encodedRadiance(colour);
+  std::vector<Input> inputs{{&radiance, Encoding::AsItIs}};
   std::string name = "rt_hdr";
   const bool large = choice_.size == OidnSize::Large;
   const std::string size = choice_.size == OidnSize::Small ? "_small" : "";

@@ -31,7 +31,7 @@ class OidnNetworks {
 
  private:
   // What one network reads, three channels each, and how.
-  enum class Encoding { Radiance, Albedo, Normal, AsItIs };
+  enum class Encoding { AsItIs, Albedo, Normal };
   struct Input {
     const Rgb<float>* image;
     Encoding encoding;

@@ -65,15 +65,16 @@ class OneDnnConvolution : public Convolution {
         weights_(std::move(weights)),
         bias_(std::move(bias)) {}
 
-  bool run(const float* in, float* out) const override try {
+  size_t scratchValues() const override { return (scratchpad_.get_size() + sizeof(float) - 1) / sizeof(float); }
+
+  bool run(const float* in, float* out, float* scratch) const override try {
     const OneThread alone;
     dnnl::stream stream(engine());
-    memory scratchpad(scratchpad_, engine());
     convolution_.execute(stream, {{DNNL_ARG_SRC, memory(in_, engine(), const_cast<float*>(in))},
                                   {DNNL_ARG_DST, memory(out_, engine(), out)},
                                   {DNNL_ARG_WEIGHTS, weights_},
                                   {DNNL_ARG_BIAS, bias_},
-                                  {DNNL_ARG_SCRATCHPAD, scratchpad}});
+                                  {DNNL_ARG_SCRATCHPAD, memory(scratchpad_, engine(), scratch)}});
     stream.wait();
     return true;
   } catch (const dnnl::error&) {
@@ -99,18 +100,16 @@ class OneDnnLayer : public ConvolutionLayer {
   std::unique_ptr<Convolution> prepare(const ConvolutionSize& size, std::string& error) override try {
     const OneThread alone;
     const auto plan = planned(size);
-    // Sizes agree on the order of weights as a rule: then it is found once.
-    if (weights_.get_desc() != plan.weights_desc()) {
-      memory ordered(plan.weights_desc(), engine());
-      dnnl::stream stream(engine());
-      dnnl::reorder(weights_, ordered).execute(stream, weights_, ordered);
-      stream.wait();
-      weights_ = ordered;
-    }
-    return std::make_unique<OneDnnConvolution>(plan, weights_, bias_);
+    return std::make_unique<OneDnnConvolution>(plan, ordered(plan.weights_desc()), bias_);
   } catch (const dnnl::error& e) {
     error = e.what();
     return nullptr;
+  }
+
+  size_t bytes() const override {
+    size_t sum = weights_.get_desc().get_size();
+    for (const memory& known : ordered_) sum += known.get_desc().get_size();
+    return sum;
   }
 
  private:
@@ -120,12 +119,34 @@ class OneDnnLayer : public ConvolutionLayer {
     return held;
   }
 
+  // The weights in an order that the library asked for; sizes agree on few.
+  const memory& ordered(const memory::desc& order) {
+    for (const memory& known : ordered_)
+      if (known.get_desc() == order) return known;
+    ordered_.emplace_back(order, engine());
+    dnnl::stream stream(engine());
+    dnnl::reorder(weights_, ordered_.back()).execute(stream, weights_, ordered_.back());
+    stream.wait();
+    return ordered_.back();
+  }
+
+  // Winograd's algorithm takes less than half of the time where there are enough channels, and rounds as finely here.
+  // Few processors have it, and for some sizes it wants the memory of a whole layer.
   dnnl::convolution_forward::primitive_desc planned(const ConvolutionSize& size) const {
+    constexpr memory::dim kEnough = 32;
+    if (kernel_ == 3 && inputs_ >= kEnough && outputs_ >= kEnough) try {
+        const auto plan = planned(size, dnnl::algorithm::convolution_winograd);
+        if (plan.scratchpad_desc().get_size() <= kConvolutionScratch) return plan;
+      } catch (const dnnl::error&) {
+      }
+    return planned(size, dnnl::algorithm::convolution_direct);
+  }
+
+  dnnl::convolution_forward::primitive_desc planned(const ConvolutionSize& size, dnnl::algorithm algorithm) const {
     const memory::dim width = size.left + size.width + size.right - kernel_ + 1,
                       height = size.top + size.height + size.bottom - kernel_ + 1;
     const dnnl::convolution_forward::desc wanted(
-        dnnl::prop_kind::forward_inference, dnnl::algorithm::convolution_direct,
-        {{1, inputs_, size.height, size.width}, Kind::f32, blocked()},
+        dnnl::prop_kind::forward_inference, algorithm, {{1, inputs_, size.height, size.width}, Kind::f32, blocked()},
         {{outputs_, inputs_, kernel_, kernel_}, Kind::f32, memory::format_tag::any},
         {{outputs_}, Kind::f32, memory::format_tag::x}, {{1, outputs_, height, width}, Kind::f32, blocked()}, {1, 1},
         {size.top, size.left}, {size.bottom, size.right});
@@ -142,6 +163,7 @@ class OneDnnLayer : public ConvolutionLayer {
   memory::dim inputs_, outputs_, kernel_;
   bool relu_;
   memory weights_, bias_;
+  std::vector<memory> ordered_;
 };
 
 class OneDnn final : public ConvolutionLibrary {
