@@ -2,6 +2,7 @@
 #include "combiners/learned/tile_plan.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "renderer/core/error.h"
 
@@ -82,22 +83,26 @@ std::vector<size_t> lastReads(const NetworkGraph& graph) {
   return last;
 }
 
-// Each tensor gets the lowest place that none of those that are still read takes.
+// The largest first, each gets the lowest place that none of those before it takes in its time.
 void placeTensors(const NetworkGraph& graph, TilePlan& plan) {
   const std::vector<size_t> last = lastReads(graph);
-  std::vector<size_t> alive;  // by place
-  for (size_t t = 0; t < plan.tensors.size(); ++t) {
-    // Tensor t is made by layer t - 1.
-    std::erase_if(alive, [&](size_t other) { return t > 0 && last[other] + 1 < t; });
+  std::vector<size_t> order(plan.tensors.size()), placed;  // `placed` by their places
+  std::iota(order.begin(), order.end(), size_t(0));
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t a, size_t b) { return plan.tensors[a].values > plan.tensors[b].values; });
+  // Tensor t is made by layer t - 1.
+  const auto meet = [&](size_t a, size_t b) { return a <= last[b] + 1 && b <= last[a] + 1; };
+  for (const size_t t : order) {
     TilePlan::Tensor& tensor = plan.tensors[t];
-    tensor.offset = 0;
-    auto before = alive.begin();
-    for (; before != alive.end(); ++before) {
-      const TilePlan::Tensor& other = plan.tensors[*before];
-      if (tensor.offset + tensor.values <= other.offset) break;
-      tensor.offset = other.offset + other.values;
+    if (tensor.values == 0) continue;
+    for (const size_t other : placed) {
+      if (!meet(t, other)) continue;
+      if (tensor.offset + tensor.values <= plan.tensors[other].offset) break;
+      tensor.offset = std::max(tensor.offset, plan.tensors[other].offset + plan.tensors[other].values);
     }
-    if (tensor.values > 0) alive.insert(before, t);
+    const auto after = std::find_if(placed.begin(), placed.end(),
+                                    [&](size_t other) { return plan.tensors[other].offset > tensor.offset; });
+    placed.insert(after, t);
     plan.values = std::max(plan.values, tensor.offset + tensor.values);
   }
 }

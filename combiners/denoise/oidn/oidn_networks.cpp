@@ -31,6 +31,12 @@ std::string variable(const char* name) {
   return value ? value : "";
 }
 
+bool hasLight(const Rgb<float>& colour) {
+  for (const Plane<float>& plane : colour.channel)
+    if (std::any_of(plane.data.begin(), plane.data.end(), [](float v) { return v > 0; })) return true;
+  return false;
+}
+
 Rgb<float> encodedRadiance(const Rgb<float>& colour) {
   Rgb<float> encoded(colour.width(), colour.height());
   for (size_t c = 0; c < 3; ++c)
@@ -116,6 +122,8 @@ Rgb<float> OidnNetworks::filtered(const std::string& name, const std::vector<Inp
 }
 
 Rgb<float> OidnNetworks::denoise(const Rgb<float>& colour, const Rgb<float>* albedo, const Rgb<float>* normal) {
+  // Networks add a little to black.
+  if (!hasLight(colour)) return {colour.width(), colour.height()};
   // Once, not in every tile that reads a pixel.
   const Rgb<float> radiance = encodedRadiance(colour);
   std::vector<Input> inputs{{&radiance, Encoding::AsItIs}};

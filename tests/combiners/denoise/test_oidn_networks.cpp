@@ -216,4 +216,50 @@ TEST_CASE("oidn says which weights are missing or wrong, and prefers those that 
   refused("rt_hdr_alb_nrm.tza: layer enc_conv3: ");
 }
 
+namespace {
+
+// An image of random pixels without a scale: image(1) times 2, image(2), and image(3) from -1 to 1.
+Rgb<float> randomImage(uint64_t seed, float scale, float offset) {
+  Rgb<float> image(40, 24);
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t i = 0; i < image.size(); ++i) image[c][i] = scale * noiseAt(seed, c * image.size() + i) + offset;
+  return image;
+}
+
+struct Published {
+  OidnSize size;
+  bool prefilter;
+  int features;  // 0: none, 1: albedo, 2: normals too
+  std::vector<float> values;
+};
+
+}  // namespace
+
+TEST_CASE("By the published weights oidn makes what another implementation of the networks makes of them") {
+  const OidnWeights weights = findOidnWeights();
+  if (weights.folder.empty()) {
+    MESSAGE("not tested: there are no published weights; tools/setup oidn fetches them");
+    return;
+  }
+  const ConvolutionLibrary* library = oneDnn();
+  if (!library) return;
+  const Rgb<float> colour = randomImage(1, 2, 0), albedo = randomImage(2, 1, 0), normal = randomImage(3, 2, -1);
+  for (const Published& p :
+       std::vector<Published>{{OidnSize::Small, false, 2, {0.7464578f, 1.442308f, 0.7583228f, 1.178115f}},
+                              {OidnSize::Small, true, 2, {1.208775f, 1.243472f, 0.7219555f, 0.9367519f}},
+                              {OidnSize::Base, false, 2, {1.269611f, 1.294128f, 0.9463558f, 0.9899476f}},
+                              {OidnSize::Base, true, 2, {1.43515f, 1.367319f, 0.9181495f, 0.9318759f}},
+                              {OidnSize::Large, true, 2, {0.902919f, 1.223058f, 0.9709839f, 0.9318941f}},
+                              {OidnSize::Base, false, 0, {1.327099f, 1.092913f, 0.8523962f, 1.025313f}},
+                              {OidnSize::Base, false, 1, {1.362687f, 1.335586f, 0.9276862f, 0.9067235f}},
+                              {OidnSize::Small, false, 0, {1.104093f, 1.13553f, 0.9208677f, 0.9382319f}},
+                              {OidnSize::Small, false, 1, {0.8149412f, 1.241921f, 0.8764724f, 1.546049f}}}) {
+    OidnNetworks networks(weights.folder, {p.size, p.prefilter, nullptr}, *library);
+    const Rgb<float> out =
+        networks.denoise(colour, p.features > 0 ? &albedo : nullptr, p.features > 1 ? &normal : nullptr);
+    const float got[] = {out[0].at(0, 0), out[1].at(39, 23), out[2].at(20, 5), out[0].at(7, 17)};
+    for (size_t k = 0; k < 4; ++k) CHECK(got[k] == doctest::Approx(p.values[k]).epsilon(1e-4));
+  }
+}
+
 }  // namespace braid::test_oidn_networks

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include "combiners/denoise/oidn/oidn.h"
 #include "combiners/denoise/oidn/oidn_unet.h"
 #include "combiners/learned/tiled_network.h"
 #include "renderer/core/parallel.h"
 #include "tests/support/counted_memory.h"
+#include "tests/support/gltf_fixture.h"
 #include "tests/support/plain_network.h"
 
 namespace braid::test_network_memory {
@@ -31,6 +33,34 @@ TEST_CASE("A network takes the memory that it says, whatever the image") {
   CHECK(tiled.threadBytes(8192, 8192) < (size_t(32) << 20) + kConvolutionScratch);
   CHECK(tiled.threadBytes(8192, 8192) > 0.9 * (32 << 20));
   CHECK(tiled.threadBytes(1, 1) < kConvolutionScratch + (1 << 20));
+}
+
+TEST_CASE("oidn takes no more memory than it states, and not much less where images are larger than its tiles") {
+  if (!oneDnn()) return;
+  const Folder folder;
+  writeTza((folder.path / "rt_hdr.tza").string(), randomUnet(3, 32, false));
+  const int side = TiledNetwork(oidnUnet(randomUnet(3, 32, false)), *oneDnn()).tileSide();
+  const auto method = makeOidn(nullptr, "", {folder.path.string(), true});
+  Estimate e;
+  e.mean = Rgb<float>(3 * side, 2 * side);
+  for (Plane<float>& plane : e.mean.channel) std::fill(plane.data.begin(), plane.data.end(), 0.5f);
+  e.half[0] = e.half[1] = e.mean;
+  MethodInputs in;
+  in.unbiased = &e;
+  const MethodMemory stated = method->memory({});
+  const auto pixels = static_cast<double>(e.mean.size()), each = static_cast<double>(stated.eachThread);
+  for (const int threads : {1, 2}) {
+    const int64_t before = heapBytes();
+    resetHeapPeak();
+    MethodResult result;
+    withThreads(threads, [&] { result = method->run(in); });
+    const auto peak = static_cast<double>(heapPeak() - before);
+    INFO(threads, " threads: ", peak / (pixels * stated.peak + threads * each));
+    CHECK(peak < 1.1 * (pixels * stated.peak + threads * each));
+    // Every tile of this image is at its border, and the heap of oneDNN, which holds the weights, is not counted.
+    CHECK(peak > 0.8 * (pixels * stated.peak + each));
+    CHECK(static_cast<double>(heapBytes() - before) == doctest::Approx(pixels * stated.kept).epsilon(0.1));
+  }
 }
 
 }  // namespace braid::test_network_memory
