@@ -273,6 +273,35 @@ def image_and_state_seeds(braid, folder):
         yield "state", name, rest[:header] + b"\0" + rest[header:-17]
 
 
+def tza(large, half):
+    """The weights of a U-Net of one channel."""
+    convolutions = ["enc_conv0"] * (not large) + ["dec_conv0"] * (not large)
+    for level in range(1, 5):
+        convolutions += [f"enc_conv{level}{end}"
+                         for end in (("a", "b") if large else ("",))]
+        convolutions += [f"dec_conv{level}a", f"dec_conv{level}b"]
+    convolutions += ["enc_conv5a", "enc_conv5b"] + ["dec_conv1c"] * large
+    kind, size = ("h", 2) if half else ("f", 4)
+    values, table = b"", struct.pack("<I", 2 * len(convolutions))
+    for name in convolutions:
+        first = name == ("enc_conv1a" if large else "enc_conv0")
+        last = name == ("dec_conv1c" if large else "dec_conv0")
+        wide = name.startswith("dec") and name.endswith("a")
+        outputs = 3 if last else 1
+        inputs = 3 if first else 1 + wide * (3 if "1a" in name else 1)
+        for word, sizes, layout in ((".weight", (outputs, inputs, 3, 3),
+                                     "oihw"), (".bias", (outputs,), "x")):
+            text = (name + word).encode()
+            table += struct.pack("<H", len(text)) + text
+            table += struct.pack(f"<B{len(sizes)}I", len(sizes), *sizes)
+            table += (layout + kind).encode()
+            table += struct.pack("<Q", 12 + len(values))
+            values += struct.pack("<e" if half else "<f", 0.5) \
+                * math.prod(sizes)
+    return struct.pack("<HBBQ", 0x41D7, 2, 0, 12 + len(values)) + values \
+        + table
+
+
 def words():
     """Every word that the reader of glTF compares with."""
     found = set()
@@ -288,6 +317,8 @@ def main():
     seeds += [("texture", *seed) for seed in texture_seeds()]
     with tempfile.TemporaryDirectory() as work:
         seeds += image_and_state_seeds(braid, pathlib.Path(work))
+    for large in (False, True):
+        seeds.append(("weights", f"unet {large}", tza(large, large)))
     seeds.append(("image", "three floats", write_exr(3, 2, lambda x, y: (
         x, y, 1))))
     for target, name, data in seeds:

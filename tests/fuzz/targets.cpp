@@ -12,6 +12,8 @@
 #include <fmt/format.h>
 
 #include "braid/braid.h"
+#include "combiners/denoise/oidn/oidn_unet.h"
+#include "combiners/learned/tza.h"
 #include "renderer/core/hash.h"
 #include "renderer/film/files/state_file.h"
 #include "renderer/scene/data/gltf.h"
@@ -165,8 +167,18 @@ void state(Input input) {
   });
 }
 
+void weights(Input input) {
+  expectingErrors([&] {
+    WeightTensors tensors = parseTza(input, "weights.tza");
+    for (const auto& [name, tensor] : tensors)
+      for (const float value : tensor.values) require(std::isfinite(value), "a weight is not finite");
+    graphOf(oidnUnet(std::move(tensors)));
+  });
+}
+
 const std::vector<Target>& targets() {
-  static const std::vector<Target> all{{"gltf", gltf}, {"texture", texture}, {"image", image}, {"state", state}};
+  static const std::vector<Target> all{
+      {"gltf", gltf}, {"texture", texture}, {"image", image}, {"state", state}, {"weights", weights}};
   return all;
 }
 

@@ -23,6 +23,8 @@ void texture(Input input);
 void image(Input input);
 // A state file: header up to the first zero byte, planes behind it; the first line and the checksum are put right.
 void state(Input input);
+// A file of weights in TZA, and the network that they make.
+void weights(Input input);
 
 struct Target {
   const char* name;
