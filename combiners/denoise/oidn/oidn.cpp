@@ -32,6 +32,14 @@ const Rgb<float>* featureImage(const FeaturePlanes<Rgb<float>>* feature, int h) 
   return h < 0 || feature->half[h].empty() ? &feature->mean : &feature->half[h];
 }
 
+OidnChoice choiceOf(const MethodInputs& in) {
+  OidnChoice choice;
+  choice.size = static_cast<OidnSize>(std::lround(std::min(2.0, std::max(0.0, in.options.number(kNetwork)))));
+  choice.prefilter = in.options.number(kPrefilter) != 0;
+  choice.cancel = in.cancel;
+  return choice;
+}
+
 class Oidn : public ExternalMethod {
  public:
   Oidn(const OidnApi* api, std::string reason, OidnWeights weights)
@@ -91,11 +99,7 @@ Denoise Oidn::denoiser(const MethodInputs& in) const {
   std::string reason = reason_;
   const ConvolutionLibrary* library = weights_.folder.empty() ? nullptr : openConvolutions(reason);
   if (!library) throw Error(ExitCode::Usage, reason);
-  OidnChoice choice;
-  choice.size = static_cast<OidnSize>(std::lround(std::min(2.0, std::max(0.0, in.options.number(kNetwork)))));
-  choice.prefilter = in.options.number(kPrefilter) != 0;
-  choice.cancel = in.cancel;
-  return [networks = std::make_shared<OidnNetworks>(weights_.folder, choice, *library)](
+  return [networks = std::make_shared<OidnNetworks>(weights_.folder, choiceOf(in), *library)](
              const auto& colour, const auto* albedo, const auto* normal) {
     return networks->denoise(colour, albedo, normal);
   };
@@ -107,6 +111,9 @@ MethodResult Oidn::run(const MethodInputs& in) const {
   const FeaturePlanes<Rgb<float>>* albedo = in.features ? &in.features->albedo : nullptr;
   const FeaturePlanes<Rgb<float>>* normal = in.features ? &in.features->normal : nullptr;
   MethodResult result;
+  const std::string network =
+      api_ ? "library" : oidnNetworkName(choiceOf(in), featureImage(albedo, -1), featureImage(normal, -1));
+  result.remarks.push_back({"network", Attribute::Kind::String, network, 0, 0, {}});
   result.image.mean = denoise(in.unbiased->mean, featureImage(albedo, -1), featureImage(normal, -1));
   for (int h = 0; h < 2; ++h)
     if (!in.meanOnly && !in.unbiased->half[h].empty() && !in.cancelled())

@@ -121,26 +121,33 @@ Rgb<float> OidnNetworks::filtered(const std::string& name, const std::vector<Inp
   return out;
 }
 
+std::string oidnNetworkName(const OidnChoice& choice, bool albedo, bool normal) {
+  const bool large = choice.size == OidnSize::Large;
+  const std::string size = choice.size == OidnSize::Small ? "_small" : "";
+  if (!albedo) return "rt_hdr" + size;
+  if (!normal) return "rt_hdr_alb" + size;
+  if (!large && !choice.prefilter) return "rt_hdr_alb_nrm" + size;
+  return "rt_hdr_calb_cnrm" + (large ? "_large" : size);
+}
+
 Rgb<float> OidnNetworks::denoise(const Rgb<float>& colour, const Rgb<float>* albedo, const Rgb<float>* normal) {
   // Networks add a little to black.
   if (!hasLight(colour)) return {colour.width(), colour.height()};
   // Once, not in every tile that reads a pixel.
   const Rgb<float> radiance = encodedRadiance(colour);
   std::vector<Input> inputs{{&radiance, Encoding::AsItIs}};
-  std::string name = "rt_hdr";
-  const bool large = choice_.size == OidnSize::Large;
-  const std::string size = choice_.size == OidnSize::Small ? "_small" : "";
-  if (!albedo) return filtered(name + size, inputs, true);
-  inputs.push_back({albedo, Encoding::Albedo});
-  if (!normal) return filtered(name + "_alb" + size, inputs, true);
-  inputs.push_back({normal, Encoding::Normal});
-  if (!large && !choice_.prefilter) return filtered(name + "_alb_nrm" + size, inputs, true);
-  const std::string prefilterSize = large ? "_large" : "";
-  const Rgb<float> cleanAlbedo = filtered("rt_alb" + prefilterSize, {inputs[1]}, false);
-  const Rgb<float> cleanNormal = filtered("rt_nrm" + prefilterSize, {inputs[2]}, false);
-  inputs[1] = {&cleanAlbedo, Encoding::AsItIs};
-  inputs[2] = {&cleanNormal, Encoding::AsItIs};
-  return filtered(name + "_calb_cnrm" + (large ? "_large" : size), inputs, true);
+  if (albedo) inputs.push_back({albedo, Encoding::Albedo});
+  if (albedo && normal) inputs.push_back({normal, Encoding::Normal});
+  const std::string name = oidnNetworkName(choice_, albedo, normal);
+  Rgb<float> cleanAlbedo, cleanNormal;
+  if (name.starts_with("rt_hdr_calb_cnrm")) {
+    const std::string size = choice_.size == OidnSize::Large ? "_large" : "";
+    cleanAlbedo = filtered("rt_alb" + size, {inputs[1]}, false);
+    cleanNormal = filtered("rt_nrm" + size, {inputs[2]}, false);
+    inputs[1] = {&cleanAlbedo, Encoding::AsItIs};
+    inputs[2] = {&cleanNormal, Encoding::AsItIs};
+  }
+  return filtered(name, inputs, true);
 }
 
 OidnWeights findOidnWeights() {

@@ -20,13 +20,15 @@ struct OidnChoice {
   const std::atomic<bool>* cancel = nullptr;
 };
 
+// The network, and file of weights, for the features that there are; normals alone are not read.
+std::string oidnNetworkName(const OidnChoice& choice, bool albedo, bool normal);
+
 class OidnNetworks {
  public:
   // `folder` holds the weights. The library must outlive this.
   OidnNetworks(std::string folder, const OidnChoice& choice, const ConvolutionLibrary& library);
 
-  // By the network for the features that there are; either may be null, and normals alone are not read. Throws
-  // Error(BadInput) naming a file that is not there or is none.
+  // Either feature may be null. Throws Error(BadInput) naming a file that is not there or is none.
   Rgb<float> denoise(const Rgb<float>& colour, const Rgb<float>* albedo, const Rgb<float>* normal);
 
  private:

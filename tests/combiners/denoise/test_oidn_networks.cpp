@@ -128,6 +128,7 @@ TEST_CASE("oidn by random weights is what nested loops make, for every network, 
       Features half = *c.estimates.features;
       half.albedo.mean = half.albedo.half[1];
       half.normal.mean = half.normal.half[1];
+      CHECK(r.remarks.at(0).text == (clean ? "rt_hdr_calb_cnrm" : "rt_hdr_alb_nrm") + sizes[size]);
       CHECK(differenceOf(r.image.half[1], denoised(folder, sizes[size], clean, c.pt().half[1], half)) < 1e-4);
     }
 }
