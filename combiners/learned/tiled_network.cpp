@@ -175,15 +175,11 @@ void TiledNetwork::readInput(const BlockedTensor& input, const NetworkImage& ima
   const TileRegion& r = input.region;
   const auto channels = static_cast<size_t>(network_.inputs), width = static_cast<size_t>(r.width());
   std::vector<float> row(width * channels);
-  // Tiles begin within the image: only their ends are continued.
+  // Tiles begin within the image: only their ends lie beyond it.
   const int end = std::min(r.x1, image.width);
   for (int y = r.y0; y < r.y1; ++y) {
-    if (y < image.height) {
-      image.read(y, r.x0, end, row.data());
-      for (size_t x = static_cast<size_t>(end - r.x0); x < width; ++x)
-        std::copy_n(row.begin() + static_cast<std::ptrdiff_t>((x - 1) * channels), channels,
-                    row.begin() + static_cast<std::ptrdiff_t>(x * channels));
-    }
+    std::fill(row.begin(), row.end(), 0.0f);
+    if (y < image.height) image.read(y, r.x0, end, row.data());
     setRow(input, y, row.data(), network_.inputs);
   }
 }

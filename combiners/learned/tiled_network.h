@@ -33,8 +33,8 @@ class TiledNetwork {
   // `library` must outlive it. Throws Error(BadInput) for a network that is none.
   TiledNetwork(Network network, const ConvolutionLibrary& library, size_t tileBytes = kTileBytes);
 
-  // The image is continued to whole pixels of the highest level by its last row and column. Throws Error(Internal)
-  // where the library fails.
+  // The image is continued to whole pixels of the highest level by zeros: copies of its last row are streaks, which a
+  // denoiser takes for a texture. Throws Error(Internal) where the library fails.
   void run(const NetworkImage& image);
 
   // Bytes that each thread takes for an image of this size, and that all share, once it has run.

@@ -83,14 +83,13 @@ inline Planar plainLayer(const NetworkLayer& layer, const std::vector<const Plan
   return out;
 }
 
-// The network on the whole image, continued by its last row and column to a multiple of `multiple`.
+// The network on the whole image, continued by zeros to a multiple of `multiple`.
 inline Planar plainNetwork(const Network& network, const Planar& image, int multiple) {
   const auto rounded = [&](int size) { return (size + multiple - 1) / multiple * multiple; };
   Planar padded(image.channels, rounded(image.width), rounded(image.height));
   for (int c = 0; c < padded.channels; ++c)
-    for (int y = 0; y < padded.height; ++y)
-      for (int x = 0; x < padded.width; ++x)
-        padded.at(c, x, y) = image.at(c, std::min(x, image.width - 1), std::min(y, image.height - 1));
+    for (int y = 0; y < image.height; ++y)
+      for (int x = 0; x < image.width; ++x) padded.at(c, x, y) = image.at(c, x, y);
   std::map<std::string, Planar> made{{kNetworkInput, padded}};
   for (const NetworkLayer& layer : network.layers) {
     std::vector<const Planar*> in;

@@ -82,7 +82,7 @@ void addCombineOptions(CLI::App& command, CombineChoice& c) {
       .add_option_function<std::string>("--oidn-weights", nameOidnWeights,
                                         "Folder of the weights of oidn, which are preferred to its library then "
                                         "(default: BRAID_OIDN_WEIGHTS, or where tools/setup oidn puts them)")
-      ->type_name("DIR")
+      ->type_name("FOLDER")
       ->group(kMethodOptions);
 }
 
