@@ -77,6 +77,7 @@ struct GivenQuarters {
 struct UnbiasedInput {
   const Estimate* unbiased = nullptr;  // mean, halves, variance
   Estimate* consumable = nullptr;      // the same, if nobody reads it afterwards: a method may change it
+  bool firstPass = false;  // its variance and halves were made of a single pass: they cannot judge other images
   GivenQuarters quarters;
   const std::vector<Checkpoint>* history = nullptr;  // oldest first
   // The same of fewer passes, mean, halves and variance, that `biased` and `redenoise` are made of; null: they are made

@@ -5,11 +5,12 @@
 //   2. remove fireflies of x that one or two quarters alone speak for (fireflies.h);
 //   3. filter x, its direct and indirect light apart where they are known (direct_indirect.h);
 //   4. shrink x towards every filter (shrinkage.h): filters and shrunk images are the candidates;
-//   5. combine them by errors measured across halves (relative_weights.h);
+//   5. combine them by errors measured across halves at several scales (scale_weights.h);
 //   6. refilter the result, where halves show its use (refilter.h);
 //   7. estimate the error (half_statistics.h), with the squared bias that the photon maps leave.
 // x itself is no candidate: halves cannot see the error of a firefly in the half that holds it.
 #include <algorithm>
+#include <array>
 
 #include "combiners/shrinkage/debias.h"
 #include "combiners/statistics/variance.h"
@@ -20,16 +21,17 @@
 #include "combiners/statistics/direct_indirect.h"
 #include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/registry.h"
-#include "combiners/ensemble/relative_weights.h"
+#include "combiners/ensemble/scale_weights.h"
 #include "combiners/auto/auto_filters.h"
 #include "combiners/auto/refilter.h"
+#include "combiners/pipeline/spatial_variance.h"
 #include "combiners/shrinkage/shrinkage.h"
+#include "combiners/statistics/local_range_clamp.h"
 
 namespace braid {
 
 namespace {
 
-const OptionInfo kPatch{"auto-patch", 15, "Width in pixels of the patches that errors are summed over", 1, 101};
 const OptionInfo kFuse{"auto-fuse", 1, "0: photon maps are bases, not part of the image that is denoised"};
 const OptionInfo kDebias{"auto-debias", 1, "0: photon maps are not corrected by their own bias estimate"};
 const OptionInfo kShrink{"auto-shrink", 1, "0: bases only, without James-Stein shrinkage towards them"};
@@ -41,6 +43,12 @@ const OptionInfo kFireflies{"auto-remove-fireflies", 1, "0: keep fireflies"};
 // (combiners/EXPERIMENTS.md, Bias that filters keep): filters blur less as variances fall, but not all bias goes with
 // the variance.
 constexpr double kBiasKeptByParts = 0.85;
+
+// Fewer: the variances of direct and of indirect light are known worse than that of their sum, and x, whose variance is
+// too small wherever no firefly has fallen yet, is no image to be pulled to (combiners/EXPERIMENTS.md, Auto at few
+// samples).
+constexpr uint64_t kPartsPasses = 16, kShrinkPasses = 16;
+constexpr int kNamedRange = 2;  // radius in pixels of the range that images of other denoisers are kept in
 
 class Auto : public Method {
  public:
@@ -58,18 +66,19 @@ class Auto : public Method {
   }
   MethodMemory memory(const MemoryCase& of) const override;
   std::vector<OptionInfo> options() const override {
-    return {kPatch, kFuse, kDebias, kDirectIndirect, kShrink, kFireflies, kRefilter};
+    return {kFuse, kDebias, kDirectIndirect, kShrink, kFireflies, kRefilter};
   }
   MethodResult run(const MethodInputs& in) const override;
 };
 
 MethodMemory Auto::memory(const MemoryCase& of) const {
-  const int fused = of.photonMaps > 0 ? 112 : 0, others = of.bases - of.photonMaps;
-  if (of.passes > 0 && of.passes < kAutoFewestPasses) return {48 + fused + 36 * others, 36, 2'300'000};
-  const int bases = others + 2;
+  const int fused = of.photonMaps > 0 ? 112 : 0, filters = of.bases - of.photonMaps + 2;
+  const bool shrinks = of.passes == 0 || of.passes >= kShrinkPasses;
+  const int candidates = (shrinks ? 2 : 1) * filters, pairs = candidates * (candidates + 1) / 2;
   // 48 of refiltering is a copy without fireflies; the maps of a fused image's errors are gone by then.
-  const int combining = 44 + 88 * bases + fused, refiltering = 353 + 16 * bases + (fused > 0 ? 64 : 0);
-  return {std::max(combining, refiltering), 44 + 8 * bases};
+  const int combining = 60 + 44 * candidates + 5 * pairs / 4 + fused;
+  const int refiltering = 353 + (shrinks ? 16 : 4) * filters + (fused > 0 ? 64 : 0);
+  return {std::max(combining, refiltering), 44 + 4 * candidates};
 }
 
 // The external base as a filter of x: a denoiser that has seen the unbiased image alone is run again.
@@ -120,12 +129,19 @@ std::vector<Estimate> shrunkTowards(const std::vector<Estimate>& bases, const Es
   return out;
 }
 
+// Keeps an image of a learned or another denoiser from lighting what is beside a lamp, where x shows that it is dark.
+void keepInRange(Estimate& base, const Estimate& x) {
+  if (x.variance.empty() || !hasHalves(x)) return;
+  clampToLocalRange(std::array{&base.mean, &base.half[0], &base.half[1]}, std::array{&x.mean, &x.half[0], &x.half[1]},
+                    x.mean, x.variance, kNamedRange);
+}
+
 // The image of a result filtered once more, as far as the halves of x ask for it. Its planes are the weights so far.
-void filterAgain(const Estimate& x, const MethodInputs& in, int patchRadius, MethodResult& result) {
+void filterAgain(const Estimate& x, const MethodInputs& in, MethodResult& result) {
   const Estimate first = std::move(result.image), second = refilter(first, in.features, passesOf(x), in.cancel);
   if (in.cancelled()) return;
   const std::vector<const Estimate*> both = {&second, &first};
-  const WeightMaps shares = relativeWeights(x, both, first.mean, x.variance, in.features, patchRadius);
+  const WeightMaps shares = scaleWeights(x, both, in.features).maps;
   result.image = weightedEstimate(shares, both);
   for (NamedPlane& map : result.aovs)
     parallelChunks(map.plane.size(), kPixelChunk, [&](size_t begin, size_t end) {
@@ -175,7 +191,6 @@ class AutoRun {
 
   bool isOn(const OptionInfo& option) const { return in_.options.number(option) != 0; }
   bool removesFireflies() const { return isOn(kFireflies) && mayBeMeasured(*x_); }
-  int patchRadius() const { return static_cast<int>(std::clamp(in_.options.number(kPatch), 1.0, 101.0)) / 2; }
   // x, from now on an image that may be changed.
   Estimate& changeableX();
 
@@ -199,6 +214,10 @@ MethodResult AutoRun::run() {
   if (in_.cancelled()) return std::move(result_);
   if (filters_.empty() || !mayBeMeasured(*x_)) {
     result_.image = filters_.empty() ? *x_ : std::move(filters_.back());
+    return std::move(result_);
+  }
+  if (in_.firstPass && !others_.empty()) {
+    result_.image = std::move(filters_.front());  // what halves that were made of one image say of others is chance
     return std::move(result_);
   }
   shrink();
@@ -228,7 +247,8 @@ void AutoRun::fuse() {
 }
 
 void AutoRun::filterParts() {
-  if (isFused_ || !isOn(kDirectIndirect) || !mayBeMeasured(*x_) || !hasDirectIndirect(*x_)) return;
+  if (isFused_ || !isOn(kDirectIndirect) || (x_->passes > 0 && x_->passes < kPartsPasses) || !hasDirectIndirect(*x_))
+    return;
   filters_ = autoFiltersOfParts(*x_, removesFireflies(), in_.features, in_.cancel);
   if (!filters_.empty()) biasKept_ = kBiasKeptByParts;
 }
@@ -249,21 +269,25 @@ void AutoRun::removeFireflies() {
 void AutoRun::filter() {
   std::vector<Estimate> own = std::move(filters_);
   filters_.clear();
-  for (const Estimate* b : others_) filters_.push_back(consistentHalves(baseOf(*b, *x_, isFused_, in_)));
+  for (const Estimate* b : others_) {
+    filters_.push_back(consistentHalves(baseOf(*b, *x_, isFused_, in_)));
+    keepInRange(filters_.back(), *x_);
+  }
   if (own.empty()) own = autoFilters(*x_, in_.features, in_.cancel);
   for (Estimate& e : own) filters_.push_back(std::move(e));
 }
 
 void AutoRun::shrink() {
-  if (isOn(kShrink)) shrunk_ = shrunkTowards(filters_, *x_, in_.cancel);
+  if (isOn(kShrink) && !in_.firstPass && (x_->passes == 0 || x_->passes >= kShrinkPasses))
+    shrunk_ = shrunkTowards(filters_, *x_, in_.cancel);
 }
 
 void AutoRun::combine() {
   std::vector<const Estimate*> candidates;
   for (const Estimate& e : shrunk_) candidates.push_back(&e);
   for (const Estimate& e : filters_) candidates.push_back(&e);
-  const WeightMaps weights =
-      relativeWeights(*x_, candidates, filters_.back().mean, x_->variance, in_.features, patchRadius());
+  const ScaleWeights scales = scaleWeights(*x_, candidates, in_.features);
+  const WeightMaps& weights = scales.maps;
   if (in_.cancelled()) return;
   result_.image = weightedEstimate(weights, candidates);
   std::vector<Plane<float>> maps = channelMeans(weights);
@@ -274,7 +298,7 @@ void AutoRun::combine() {
 }
 
 void AutoRun::refilterCombined() {
-  if (isOn(kRefilter)) filterAgain(*x_, in_, patchRadius(), result_);
+  if (isOn(kRefilter)) filterAgain(*x_, in_, result_);
 }
 
 void AutoRun::estimateError() {

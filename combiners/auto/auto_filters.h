@@ -10,7 +10,7 @@
 
 namespace braid {
 
-inline constexpr uint64_t kAutoFewestPasses = 4;  // fewer: the first filter alone
+inline constexpr uint64_t kAutoFewestPasses = 2;  // fewer: there are no halves
 
 // Whether errors can be measured across halves. Images of other renderers may not say their passes.
 bool mayBeMeasured(const Estimate& x);

@@ -9,6 +9,7 @@
 #include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/registry.h"
 #include "combiners/ensemble/relative_weights.h"
+#include "combiners/ensemble/scale_weights.h"
 #include "combiners/ensemble/weight_bilateral.h"
 
 namespace braid {
@@ -33,6 +34,10 @@ const OptionInfo kPrior{"ensemble-prior",
                         1e6,
                         false};
 
+const OptionInfo kScales{
+    "ensemble-scales", 0,
+    "1: weights from errors of the whole image and of windows of two sizes, as auto's; 0: the paper's"};
+
 constexpr double kImprovement = 1e-4;  // combiners/EXPERIMENTS.md, Precision of ensemble weights
 
 // Fewer passes leave too few in each half to distinguish the bases.
@@ -55,7 +60,7 @@ class Ensemble : public Method {
     return {quarters ? 50 + 23 * of.bases : 72 + 4 * of.bases, 40 + 4 * of.bases};
   }
   std::vector<OptionInfo> options() const override {
-    return {kPatch, kFilter, kShared, kNonNegative, kFullError, kRelative, kPrior};
+    return {kPatch, kFilter, kShared, kNonNegative, kFullError, kRelative, kPrior, kScales};
   }
   MethodResult run(const MethodInputs& in) const override;
 };
@@ -78,23 +83,29 @@ Attribute remark(const char* name, const std::string& text) {
   return a;
 }
 
-MethodResult Ensemble::run(const MethodInputs& in) const {
-  MethodResult result;
+// The weights of the paper, by the options.
+WeightMaps patchWeights(const MethodInputs& in) {
   EnsembleChoices choices = choicesOf(in.options);
   Plane<float> roots;
   if (in.options.number(kRelative) != 0) {
     roots = relativeErrorRoots(in.unbiased->mean, meanVariance(*in.unbiased));
     choices.rootWeights = &roots;
   }
+  const WeightMaps weights = ensembleWeights(*in.unbiased, in.bases, choices);
+  if (in.options.number(kFilter) == 0) return weights;
+  return filteredWeights(weights, weightedEstimate(weights, in.bases), in.features);
+}
+
+MethodResult Ensemble::run(const MethodInputs& in) const {
+  MethodResult result;
   const uint64_t passes = in.unbiased->passes;
+  const bool scales = in.options.number(kScales) != 0;
   WeightMaps weights;
-  if (passes > 0 && passes < kFewestPasses) {
+  if (!scales && passes > 0 && passes < kFewestPasses) {
     weights = uniformWeights(in.bases.size(), 1, in.unbiased->mean.width(), in.unbiased->mean.height());
     result.remarks.push_back(remark("weights", "equal, for there are fewer than 8 passes"));
   } else {
-    weights = ensembleWeights(*in.unbiased, in.bases, choices);
-    if (in.options.number(kFilter) != 0)
-      weights = filteredWeights(weights, weightedEstimate(weights, in.bases), in.features);
+    weights = scales ? scaleWeights(*in.unbiased, in.bases, in.features).maps : patchWeights(in);
   }
   result.image = weightedEstimate(weights, in.bases);
   result.error = crossHalfErrorMap(result.image.half, *in.unbiased, meanVariance(*in.unbiased), result.image.mean);

@@ -103,7 +103,8 @@ std::string CombinePlanner::lacks(const std::string& name, const Needs& needs, b
   if (needs.halves && !e->halves) return fmt::format("needs the halves of {}", name);
   if (!unbiased) return {};
   if (needs.variance && !e->variance) return fmt::format("needs the variance of {}", name);
-  if (e->passes > 0 && e->passes < needs.passes)
+  const uint64_t completed = e->passes == 1 && e->variance ? 2 : e->passes;  // has what two passes would show
+  if (e->passes > 0 && completed < needs.passes)
     return fmt::format("needs {} of {}, which has {}", plural(needs.passes, "pass", "passes"), name, e->passes);
   if (needs.quarters && !e->quarters) return fmt::format("needs the quarter buffers of {}", name);
   if (e->checkpoints < needs.checkpoints)
@@ -254,10 +255,16 @@ void CombinePlanner::dropReplaced(const std::vector<std::string>& wanted) {
   std::erase_if(combinePlan.steps, [&](const Step& step) { return replaced_.count(step.name) > 0; });
 }
 
-// Estimates of a file that earlier runs of methods made give way to the methods of their names.
-AvailableEstimates withoutMethods(const AvailableEstimates& available) {
+// What methods find: estimates of a file that earlier runs of methods made give way to the methods of their names, and
+// first passes have been completed (completeFirstPasses()).
+AvailableEstimates forMethods(const AvailableEstimates& available) {
   AvailableEstimates kept = available;
   std::erase_if(kept.estimates, [](const AvailableEstimate& e) { return isMethod(e.name); });
+  for (AvailableEstimate& e : kept.estimates) {
+    if (!e.unbiased || e.passes != 1) continue;
+    e.halves = e.variance = true;
+    e.quarters = e.directIndirect = false;
+  }
   return kept;
 }
 
@@ -307,7 +314,7 @@ const Step* CombinePlan::find(const std::string& name) const {
 
 CombinePlan makeCombinePlan(const AvailableEstimates& available, const std::vector<std::string>& wanted,
                             const CombinePlanOptions& options) {
-  const AvailableEstimates kept = withoutMethods(available);
+  const AvailableEstimates kept = forMethods(available);
   CombinePlanner maker(kept, options);
   for (const std::string& name : options.denoisers) maker.add(name);
   for (const std::string& name : wanted) maker.add(name);

@@ -12,6 +12,7 @@
 
 #include "combiners/statistics/half_estimate.h"
 #include "combiners/pipeline/invalid_pixels.h"
+#include "combiners/pipeline/spatial_variance.h"
 #include "combiners/pixels/plane_mean.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
@@ -119,6 +120,7 @@ void Runner::take(const CombinePlan& combinePlan) {
   features = features && !fit;
   all_ = normalised(*given_, result.exposure, result.sanitised, read);
   features_ = fit ? &*given_->features : all_.features ? &*all_.features : nullptr;
+  completeFirstPasses(all_, features_);
 }
 
 void Runner::keepEarlier(const CombinePlan& combinePlan) {
@@ -170,6 +172,8 @@ std::string Runner::missingInput(const Step& step, bool& failed) const {
 MethodInputs Runner::inputsOf(const Step& step) const {
   MethodInputs in;
   in.unbiased = estimate(step.unbiased);
+  const Estimate* given = given_->find(step.unbiased);
+  in.firstPass = given && given->unbiased && given->passes == 1;
   in.biased = estimate(step.biased);
   in.correlated = estimate(step.correlated);
   for (const std::string& base : step.bases) in.bases.push_back(estimate(base));
@@ -248,7 +252,8 @@ void Runner::run(Step step, bool last) {
     Estimate& image = out.result.image;
     image.name = step.name;
     image.unbiased = false;
-    image.passes = unbiased ? unbiased->passes : 0;
+    const Estimate* given = given_->find(step.unbiased);
+    image.passes = unbiased ? std::max(unbiased->passes, given ? given->passes : 0) : 0;
     image.seconds = out.seconds;
     if (step.skipReason.empty() && (image.mean.width() != all_.width || image.mean.height() != all_.height)) {
       step.skipReason = fmt::format("its image has {}x{} pixels instead of {}x{}", image.mean.width(),

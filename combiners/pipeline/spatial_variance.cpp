@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "combiners/pipeline/spatial_variance.h"
+#include "combiners/statistics/surface_smooth.h"
+#include "combiners/pixels/finite_float.h"
 
 #include <algorithm>
 #include <array>
@@ -17,6 +19,7 @@ namespace braid {
 namespace {
 
 constexpr int kRadius = 4;
+constexpr int kScatterRadius = 7;
 constexpr float kAlbedoFloor = 0.01f;
 constexpr double kFloor = 0.01;  // added to brightnesses that are divided by, of an image with middle grey at 0.18
 // Of second differences of features: what is more is an edge.
@@ -186,6 +189,34 @@ void makeHalves(Estimate& e, uint64_t seed) {
       }
     }
   });
+}
+
+Rgb<float> scatterAlongSurfaces(const Rgb<float>& image, const Features* features) {
+  Rgb<float> out(image.width(), image.height(), kUnfilled);
+  for (size_t c = 0; c < 3; ++c) {
+    Plane<float> squares(image.width(), image.height(), kUnfilled);
+    parallelChunks(squares.size(), kPixelChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) squares[i] = finiteFloat(sqr(static_cast<double>(image[c][i])));
+    });
+    const std::vector<Plane<float>> means = surfaceSmooth({&image[c], &squares}, features, kScatterRadius);
+    parallelChunks(squares.size(), kPixelChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i)
+        out[c][i] =
+            finiteFloat(std::max(0.0, static_cast<double>(means[1][i]) - sqr(static_cast<double>(means[0][i]))));
+    });
+  }
+  return out;
+}
+
+void completeFirstPasses(Estimates& all, const Features* features) {
+  for (Estimate& e : all.estimates) {
+    if (!e.unbiased || e.passes != 1) continue;
+    e.variance = scatterAlongSurfaces(e.mean, features);
+    makeHalves(e, all.seed);
+    e.quarter.clear();
+    e.direct = {};
+    e.passes = 0;
+  }
 }
 
 }  // namespace braid

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Variance and halves for images that come without: one image of another renderer, of which nothing else is known.
+// Variance and halves for images that come without: one image of another renderer, of which nothing else is known, and
+// the first pass of a render.
 // Neither is as good as what a render knows of itself (combiners/EXPERIMENTS.md, Variance of a single image).
 #pragma once
 
@@ -22,5 +23,14 @@ Rgb<float> spatialVariance(const Rgb<float>& image, const Features* features);
 // independent of each other (data fission, Leiner et al. 2023). `seed` chooses the noise; the channels of a pixel share
 // it, as those of path tracing nearly do.
 void makeHalves(Estimate& estimate, uint64_t seed = 0);
+
+// The variance of the colours in 15x15 pixels about every pixel, along its surface (surface_smooth.h): what is left of
+// one sample a pixel, most of which are black under light that few find. Finite, >= 0, in the units of image².
+Rgb<float> scatterAlongSurfaces(const Rgb<float>& image, const Features* features);
+
+// Gives unbiased estimates of a single pass, of which no render knows a variance or has halves, that variance and
+// makeHalves(), so that every method runs on them, and passes of 0: not known, since neither is what counts of passes
+// say.
+void completeFirstPasses(Estimates& estimates, const Features* features);
 
 }  // namespace braid

@@ -5,7 +5,7 @@
 
 #include <doctest/doctest.h>
 
-#include "combiners/ensemble/one_hot.h"
+#include "combiners/ensemble/one_hot/one_hot.h"
 #include "combiners/pipeline/registry.h"
 #include "tests/support/combiner_fixture.h"
 

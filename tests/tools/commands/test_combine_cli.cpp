@@ -189,7 +189,7 @@ TEST_CASE("auto fuses what an auto plan rendered, offline as in process") {
 
 TEST_CASE("auto filters direct and indirect light apart, offline as in process") {
   const Folder folder;
-  const std::string options = "render '" BRAID_SOURCE_DIR "/scenes/cornell.glb' -q --size 48x27 --spp 8 --float ";
+  const std::string options = "render '" BRAID_SOURCE_DIR "/scenes/cornell.glb' -q --size 48x27 --spp 16 --float ";
   REQUIRE(braidRun(folder, options + "--integrator pt --quarters --direct-indirect -o a.exr").code == 0);
   REQUIRE(braidRun(folder, test::plainly(options + "--quarters --direct-indirect -o b.exr")).code == 0);
   const ImageFile a = readImage(folder.path / "a.exr");

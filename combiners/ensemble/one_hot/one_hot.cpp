@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "combiners/ensemble/one_hot.h"
+#include "combiners/ensemble/one_hot/one_hot.h"
 
 #include <algorithm>
 #include <array>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // One base a pixel, by estimated errors that a cross bilateral filter over the features has smoothed
-// (combiners/ensemble/one_hot.h).
+// (combiners/ensemble/one_hot/one_hot.h).
 #include "combiners/statistics/variance.h"
-#include "combiners/ensemble/one_hot.h"
+#include "combiners/ensemble/one_hot/one_hot.h"
 #include "combiners/pipeline/registry.h"
 
 namespace braid {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // One base a pixel, by estimated errors that a non-local means filter guided by the noisy image has smoothed, as NFOR
-// does it: patches of 3x3 pixels, windows of 19x19 (combiners/ensemble/one_hot.h).
+// does it: patches of 3x3 pixels, windows of 19x19 (combiners/ensemble/one_hot/one_hot.h).
 #include "combiners/denoise/nlm/nlm_filter.h"
 #include "combiners/statistics/half_statistics.h"
-#include "combiners/ensemble/one_hot.h"
+#include "combiners/ensemble/one_hot/one_hot.h"
 #include "combiners/pipeline/registry.h"
 
 namespace braid {

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Weights of an ensemble from errors at several scales. The errors that halves show in a window know little from few
+// samples and much from many; those of the whole image know much from the first samples on, but nothing of places.
+#pragma once
+
+#include "combiners/ensemble/ensemble_weights.h"
+
+namespace braid {
+
+struct ScaleWeights {
+  WeightMaps maps;            // on the simplex, of all channels together
+  double localShare[2] = {};  // mean shares of the windows in what the weights minimise: of the wide and the narrow one
+};
+
+// Minimises wᵀMw with w >= 0 and sum(w) = 1 for blocks of 4x4 pixels (block_errors.h), with errors relative to a common
+// brightness (error_scale.h), and smooths the maps along surfaces. M starts as the mean E of e_i e_j over the image.
+// Windows of about 36, then of about 12 pixels draw it to their own mean,
+//   M <- M + s (m - M),   s = max(0, 1 - 2 N / S),
+// with m the mean over the window, averaged over both pairings of halves A and B. S is the squared distance of m to M
+// in how much better one candidate is than another, N that of the pairings to their mean, both summed over all pairs
+// of candidates and over neighbouring windows: pairings know nothing of each other's noise. So the wider scale is a
+// prior whose weight follows from the noise of the narrower one (empirical Bayes: the positive part of James and
+// Stein), and with many samples the windows have the last word. All images have halves; the features may be absent.
+ScaleWeights scaleWeights(const Estimate& x, const std::vector<const Estimate*>& candidates, const Features* features);
+
+}  // namespace braid

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+// Weights from errors at several scales: their matrices against plain loops, and who decides at how many samples.
+#include <cmath>
+#include <random>
+
+#include <doctest/doctest.h>
+
+#include "combiners/ensemble/scale_weights.h"
+#include "combiners/ensemble/scales/block_errors.h"
+#include "combiners/ensemble/scales/error_scale.h"
+
+namespace braid::test_scale_weights {
+
+namespace {
+
+using Value = double (*)(int x, int y);
+
+// An estimate whose mean is value(x, y) and whose halves have normal noise of this deviation.
+Estimate noisy(int width, int height, Value value, double deviation, uint32_t seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0, 1);
+  Estimate e;
+  e.passes = 4;
+  e.mean = e.half[0] = e.half[1] = Rgb<float>(width, height);
+  for (size_t c = 0; c < 3; ++c)
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        for (Rgb<float>& half : e.half) half[c].at(x, y) = static_cast<float>(value(x, y) + deviation * normal(random));
+        e.mean[c].at(x, y) = 0.5f * (e.half[0][c].at(x, y) + e.half[1][c].at(x, y));
+      }
+  return e;
+}
+
+double flat(int, int) { return 1; }
+double brighter(int, int) { return 1.1; }
+double rightLeft(int x, int) { return x < 80 ? 1 : 1.5; }
+double rightRight(int x, int) { return x < 80 ? 1.5 : 1; }
+
+}  // namespace
+
+TEST_CASE("Errors of blocks are those of plain loops, at the borders too") {
+  const int width = 11, height = 6;
+  const Estimate x = noisy(width, height, flat, 0.5, 1), a = noisy(width, height, brighter, 0.1, 2),
+                 b = noisy(width, height, rightRight, 0.2, 3);
+  const std::vector<const Estimate*> both = {&a, &b};
+  const Plane<float> roots = commonErrorRoots(both);
+  for (const int half : {0, 1}) {
+    const std::vector<Plane<float>> blocks = blockErrors(x, both, roots, half);
+    REQUIRE(blocks.size() == 3);
+    REQUIRE(blocks[0].width == 3);
+    REQUIRE(blocks[0].height == 2);
+    const auto error = [&](const Estimate& e, size_t c, int u, int v) {
+      double sum = 0;
+      for (const int dv : {-1, 0})
+        for (const int du : {-1, 0}) {
+          const int s = std::max(0, u + du), t = std::max(0, v + dv);
+          sum += 0.25 *
+                 (static_cast<double>(e.half[half][c].at(s, t)) - static_cast<double>(x.half[1 - half][c].at(s, t))) *
+                 static_cast<double>(roots.at(s, t));
+        }
+      return sum;
+    };
+    for (int row = 0; row < 2; ++row)
+      for (int column = 0; column < 3; ++column) {
+        double sum = 0, count = 0;
+        for (int v = 4 * row; v < std::min(height, 4 * row + 4); ++v)
+          for (int u = 4 * column; u < std::min(width, 4 * column + 4); ++u, ++count)
+            for (size_t c = 0; c < 3; ++c) sum += error(a, c, u, v) * error(b, c, u, v);
+        CHECK(blocks[pairIndex(1, 0)].at(column, row) == doctest::Approx(sum / count).epsilon(1e-4));
+      }
+  }
+}
+
+TEST_CASE("The common brightness: a lamp's own, and the dark beside it") {
+  Estimate e;
+  e.mean = Rgb<float>(21, 21, 0.02f);
+  for (size_t c = 0; c < 3; ++c) e.mean[c].at(10, 10) = 100;
+  Estimate leak = e;
+  for (size_t c = 0; c < 3; ++c) leak.mean[c].at(11, 10) = 2;
+  const Plane<float> roots = commonErrorRoots({&e, &leak});
+  CHECK(roots.at(10, 10) == doctest::Approx(0.01).epsilon(0.01));  // 1 / 100
+  CHECK(1 / roots.at(12, 10) < 0.15f);                             // not that of the lamp, two pixels off
+  CHECK(1 / roots.at(11, 10) < 0.3f);                              // of 0.02 and 2: what leaks counts
+}
+
+TEST_CASE("Without noise windows decide, under heavy noise the whole image does") {
+  const int width = 160, height = 96;
+  const Estimate left = noisy(width, height, rightLeft, 0.01, 2), right = noisy(width, height, rightRight, 0.01, 3);
+  const auto weightAt = [&](double deviation, int x) {
+    const Estimate samples = noisy(width, height, flat, deviation, 4);
+    const ScaleWeights w = scaleWeights(samples, {&left, &right}, nullptr);
+    for (size_t i = 0; i < w.maps.planes[0].size(); ++i)
+      REQUIRE(w.maps.planes[0][i] + w.maps.planes[1][i] == doctest::Approx(1).epsilon(1e-4));
+    return static_cast<double>(w.maps.of(0, 0).at(x, height / 2));
+  };
+  CHECK(weightAt(0.01, 16) > 0.95);
+  CHECK(weightAt(0.01, 144) < 0.05);
+  CHECK(std::fabs(weightAt(100, 16) - weightAt(100, 144)) < 0.5);
+}
+
+TEST_CASE("From few samples the better of two images is found by the whole image") {
+  // The noise is ten times the difference of the images. Their difference in squared error over the image, 0.01 in 1,
+  // has a deviation of 0.2 / sqrt(3 * 160 * 96) for a pairing: a false alarm is beyond eight of them.
+  const int width = 160, height = 96;
+  const Estimate good = noisy(width, height, flat, 0.01, 2), bad = noisy(width, height, brighter, 0.01, 3);
+  for (uint32_t seed = 10; seed < 20; ++seed) {
+    const ScaleWeights w = scaleWeights(noisy(width, height, flat, 1, seed), {&good, &bad}, nullptr);
+    double mean = 0;
+    for (const float v : w.maps.of(0, 0).data) mean += static_cast<double>(v) / (width * height);
+    CAPTURE(seed);
+    CHECK(mean > 0.7);
+  }
+}
+
+TEST_CASE("Extreme images: finite weights on the simplex") {
+  for (const double scale : {0.0, 1e-30, 1e30}) {
+    Estimate x = noisy(5, 3, flat, 1, 1), y = noisy(5, 3, brighter, 0, 2);
+    for (Estimate* e : {&x, &y})
+      for (Rgb<float>* image : {&e->mean, &e->half[0], &e->half[1]})
+        for (size_t c = 0; c < 3; ++c)
+          for (float& v : (*image)[c].data) v = static_cast<float>(static_cast<double>(v) * scale);
+    const ScaleWeights w = scaleWeights(x, {&x, &y, &y}, nullptr);
+    for (size_t i = 0; i < 15; ++i) {
+      double sum = 0;
+      for (const Plane<float>& plane : w.maps.planes) {
+        REQUIRE(std::isfinite(plane[i]));
+        CHECK(plane[i] >= 0);
+        sum += static_cast<double>(plane[i]);
+      }
+      CHECK(sum == doctest::Approx(1).epsilon(1e-4));
+    }
+  }
+}
+
+}  // namespace braid::test_scale_weights
