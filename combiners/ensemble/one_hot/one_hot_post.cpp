@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One base a pixel, by its estimated error as it is; then the maps of the selection pass through the filter that the
-// weights of ensembles pass through. The best of the three selections in the paper (combiners/ensemble/one_hot/one_hot.h).
+// weights of ensembles pass through. The best of the three selections in the paper
+// (combiners/ensemble/one_hot/one_hot.h).
 #include "combiners/ensemble/one_hot/one_hot.h"
 #include "combiners/pipeline/registry.h"
 #include "combiners/ensemble/weight_bilateral.h"

@@ -13,7 +13,7 @@
 #include "renderer/core/error.h"
 #include "tests/support/combiner_fixture.h"
 #include "tests/support/gltf_fixture.h"
-#include "tests/support/plain_network.h"
+#include "tests/combiners/learned/plain_network.h"
 
 namespace braid::test_oidn_networks {
 

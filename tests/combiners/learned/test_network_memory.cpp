@@ -7,7 +7,7 @@
 #include "renderer/core/parallel.h"
 #include "tests/support/counted_memory.h"
 #include "tests/support/gltf_fixture.h"
-#include "tests/support/plain_network.h"
+#include "tests/combiners/learned/plain_network.h"
 
 namespace braid::test_network_memory {
 

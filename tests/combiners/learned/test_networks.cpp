@@ -8,7 +8,7 @@
 #include "combiners/denoise/oidn/oidn_unet.h"
 #include "combiners/learned/tiled_network.h"
 #include "renderer/core/error.h"
-#include "tests/support/plain_network.h"
+#include "tests/combiners/learned/plain_network.h"
 
 namespace braid::test_networks {
 

@@ -8,7 +8,7 @@
 #include "combiners/learned/tza.h"
 #include "renderer/core/error.h"
 #include "tests/support/gltf_fixture.h"
-#include "tests/support/plain_network.h"
+#include "tests/combiners/learned/plain_network.h"
 
 namespace braid::test_tza {
 
