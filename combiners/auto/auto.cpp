@@ -223,7 +223,7 @@ MethodResult AutoRun::run() {
   shrink();
   if (!in_.cancelled()) combine();
   if (!in_.cancelled()) refilterCombined();
-  if (!in_.cancelled()) estimateError();
+  if (!in_.cancelled() && !in_.firstPass) estimateError();  // halves that were made tell nothing
   return std::move(result_);
 }
 

@@ -49,9 +49,9 @@ void PreviewFeed::round(const Progress& p) {
   const Snapshot snapshot = session_.snapshot();
   nextNoisy_ = p.seconds + std::max(kInterval, clock.seconds() / kHeldUpShare);
   showNoisy(snapshot, p.seconds);
-  const double pause = combineTook_ / kCombiningShare;
-  // With one sample there is nothing yet that a method could tell noise from.
-  if (combines_ && samplesOf(*snapshot) >= 2 && combineJob_.idle() &&
+  // A picture of one sample is there to be replaced: the next one does not wait for its share.
+  const double pause = combineSamples_ > 1 ? combineTook_ / kCombiningShare : 0;
+  if (combines_ && samplesOf(*snapshot) > combineSamples_ && combineJob_.idle() &&
       (combineBegan_ < 0 || p.seconds >= combineBegan_ + pause))
     combine(snapshot, p.seconds);
 }
@@ -64,6 +64,7 @@ void PreviewFeed::showNoisy(const Snapshot& snapshot, double seconds) {
 
 void PreviewFeed::combine(const Snapshot& snapshot, double seconds) {
   combineBegan_ = seconds;
+  combineSamples_ = samplesOf(*snapshot);
   combineJob_.start([this, snapshot, seconds] {
     const Stopwatch clock;
     const PipelineResult result = runCombining(*snapshot, choice_, choice_.options(&cancel_), helpers_);

@@ -194,7 +194,7 @@ TEST_CASE("A running preview answers with page, state and images, and a stop sav
   Json s;
   CHECK(waitUntil([&] {
     s = stateOf(preview);
-    return s["estimatedError"]["combined"].is_number() && s["spp"] >= 4;
+    return s["estimatedError"]["combined"].is_number() && s["estimatedError"]["noisy"].is_number() && s["spp"] >= 4;
   }));
   checkState(s, file);
   checkImages(preview);
