@@ -51,7 +51,7 @@ class PreviewFeed {
   int helpers_ = 1;  // threads that combine
   double nextNoisy_ = 0;
   std::atomic<double> combineTook_{0};  // seconds, the latest one
-  uint64_t combineSamples_ = 0;  // of the image that was combined last
+  uint64_t combineSamples_ = 0;         // of the image that was combined last
   double combineBegan_ = -1;
   std::atomic<bool> cancel_{false};
   std::set<std::string> told_;
