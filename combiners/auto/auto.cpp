@@ -24,9 +24,9 @@
 #include "combiners/ensemble/scale_weights.h"
 #include "combiners/auto/auto_filters.h"
 #include "combiners/auto/refilter.h"
-#include "combiners/pipeline/spatial_variance.h"
 #include "combiners/shrinkage/shrinkage.h"
 #include "combiners/statistics/local_range_clamp.h"
+#include "renderer/film/make_attribute.h"
 
 namespace braid {
 
@@ -141,21 +141,13 @@ void filterAgain(const Estimate& x, const MethodInputs& in, MethodResult& result
   const Estimate first = std::move(result.image), second = refilter(first, in.features, passesOf(x), in.cancel);
   if (in.cancelled()) return;
   const std::vector<const Estimate*> both = {&second, &first};
-  const WeightMaps shares = scaleWeights(x, both, in.features).maps;
+  const WeightMaps shares = scaleWeights(x, both, in.features);
   result.image = weightedEstimate(shares, both);
   for (NamedPlane& map : result.aovs)
     parallelChunks(map.plane.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) map.plane[i] *= shares.of(1, 0)[i];
     });
   result.aovs.push_back({"weight.auto.second-pass", shares.of(0, 0)});
-}
-
-Attribute countRemark(const char* name, size_t count) {
-  Attribute a;
-  a.name = name;
-  a.kind = Attribute::Kind::Int;
-  a.integer = static_cast<int64_t>(count);
-  return a;
 }
 
 void addTo(Plane<float>& sum, const Plane<float>& other) {
@@ -169,7 +161,7 @@ FusedEstimate fusedWith(std::vector<const Estimate*> photonMaps, const MethodInp
   std::vector<Estimate> corrected;
   corrected.reserve(photonMaps.size());
   for (const Estimate*& map : photonMaps)
-    if (mayBeMeasured(*map)) map = &corrected.emplace_back(debiased(*map));
+    if (map->passes != 1) map = &corrected.emplace_back(debiased(*map));
   return fusedEstimate(*in.unbiased, photonMaps, in.features);
 }
 
@@ -190,7 +182,7 @@ class AutoRun {
   void estimateError();
 
   bool isOn(const OptionInfo& option) const { return in_.options.number(option) != 0; }
-  bool removesFireflies() const { return isOn(kFireflies) && mayBeMeasured(*x_); }
+  bool removesFireflies() const { return isOn(kFireflies); }
   // x, from now on an image that may be changed.
   Estimate& changeableX();
 
@@ -212,8 +204,8 @@ MethodResult AutoRun::run() {
   removeFireflies();
   filter();
   if (in_.cancelled()) return std::move(result_);
-  if (filters_.empty() || !mayBeMeasured(*x_)) {
-    result_.image = filters_.empty() ? *x_ : std::move(filters_.back());
+  if (filters_.empty()) {
+    result_.image = *x_;
     return std::move(result_);
   }
   if (in_.firstPass && !others_.empty()) {
@@ -241,7 +233,7 @@ void AutoRun::fuse() {
     fused_ = fusedWith(photonMaps, in_);
     x_ = changeable_ = &fused_.image;
   }
-  if (!mayBeMeasured(*x_) || !x_->variance.empty()) return;
+  if (!x_->variance.empty()) return;
   Estimate& x = changeableX();
   if (x.variance.empty()) x.variance = meanVariance(x);
 }
@@ -257,7 +249,7 @@ void AutoRun::removeFireflies() {
   if (!removesFireflies()) return;
   const GivenQuarters quarters = isFused_ ? GivenQuarters{&fused_.image.quarter} : in_.quarters;
   const std::vector<Firefly> fireflies = findFireflies(*x_, quarters, in_.features);
-  result_.remarks.push_back(countRemark("removedFireflies", fireflies.size()));
+  result_.remarks.push_back(wholeAttribute("removedFireflies", fireflies.size()));
   if (fireflies.empty()) return;
   if (!fused_.noise.empty()) replaceVariances(fused_.noise, fireflies);
   Estimate& x = changeableX();
@@ -286,8 +278,7 @@ void AutoRun::combine() {
   std::vector<const Estimate*> candidates;
   for (const Estimate& e : shrunk_) candidates.push_back(&e);
   for (const Estimate& e : filters_) candidates.push_back(&e);
-  const ScaleWeights scales = scaleWeights(*x_, candidates, in_.features);
-  const WeightMaps& weights = scales.maps;
+  const WeightMaps weights = scaleWeights(*x_, candidates, in_.features);
   if (in_.cancelled()) return;
   result_.image = weightedEstimate(weights, candidates);
   std::vector<Plane<float>> maps = channelMeans(weights);

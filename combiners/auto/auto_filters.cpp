@@ -39,8 +39,6 @@ std::vector<Estimate> wideFilter(const PatchWelchInput& input, bool firstOrder, 
 
 }  // namespace
 
-bool mayBeMeasured(const Estimate& x) { return x.passes == 0 || x.passes >= kAutoFewestPasses; }
-
 std::vector<Estimate> autoFilters(const Estimate& x, const Features* features, const std::atomic<bool>* cancel) {
   const auto cancelled = [&] { return cancel && cancel->load(); };
   std::vector<Estimate> filtered;
@@ -48,8 +46,6 @@ std::vector<Estimate> autoFilters(const Estimate& x, const Features* features, c
   {
     const PatchWelchInput input = patchWelchInput(x, features);
     if (input.variance.empty()) return filtered;
-    if (!mayBeMeasured(x))
-      return {asEstimate(std::move(patchWelch(input, std::array{kPatchWelchThreshold}, {}, {}, cancel)[0]), "pw")};
     filtered = wideFilter(input, x.passes >= kFirstOrderPasses, cancel);
   }
   if (cancelled()) return filtered;

@@ -8,6 +8,7 @@
 #include "combiners/statistics/half_statistics.h"
 #include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/registry.h"
+#include "renderer/film/make_attribute.h"
 #include "combiners/ensemble/relative_weights.h"
 #include "combiners/ensemble/scale_weights.h"
 #include "combiners/ensemble/weight_bilateral.h"
@@ -76,13 +77,6 @@ EnsembleChoices choicesOf(const MethodOptions& options) {
   return choices;
 }
 
-Attribute remark(const char* name, const std::string& text) {
-  Attribute a;
-  a.name = name;
-  a.text = text;
-  return a;
-}
-
 // The weights of the paper, by the options.
 WeightMaps patchWeights(const MethodInputs& in) {
   EnsembleChoices choices = choicesOf(in.options);
@@ -103,9 +97,9 @@ MethodResult Ensemble::run(const MethodInputs& in) const {
   WeightMaps weights;
   if (!scales && passes > 0 && passes < kFewestPasses) {
     weights = uniformWeights(in.bases.size(), 1, in.unbiased->mean.width(), in.unbiased->mean.height());
-    result.remarks.push_back(remark("weights", "equal, for there are fewer than 8 passes"));
+    result.remarks.push_back(textAttribute("weights", "equal, for there are fewer than 8 passes"));
   } else {
-    weights = scales ? scaleWeights(*in.unbiased, in.bases, in.features).maps : patchWeights(in);
+    weights = scales ? scaleWeights(*in.unbiased, in.bases, in.features) : patchWeights(in);
   }
   result.image = weightedEstimate(weights, in.bases);
   result.error = crossHalfErrorMap(result.image.half, *in.unbiased, meanVariance(*in.unbiased), result.image.mean);
@@ -115,7 +109,7 @@ MethodResult Ensemble::run(const MethodInputs& in) const {
     result.aovs.push_back(
         {"weight.ensemble." + (base.empty() ? std::to_string(b) : layerName(base)), std::move(maps[b])});
     if (in.bases[b]->unbiased)
-      result.remarks.push_back(remark("warning", "the unbiased image as a base makes the ensemble much worse"));
+      result.remarks.push_back(textAttribute("warning", "the unbiased image as a base makes the ensemble much worse"));
   }
   return result;
 }

@@ -53,8 +53,8 @@ Plane<float> windowShares(const PairPlanes (&window)[2], const PairPlanes& m, si
   return distance;
 }
 
-// Draws M to the windows of one size; returns their mean share.
-double drawTo(const PairPlanes (&blocks)[2], size_t candidates, int radius, PairPlanes& m) {
+// Draws M to the windows of one size.
+void drawTo(const PairPlanes (&blocks)[2], size_t candidates, int radius, PairPlanes& m) {
   PairPlanes window[2];
   for (size_t h = 0; h < 2; ++h)
     for (const Plane<float>& plane : blocks[h]) window[h].push_back(boxMean<float>(plane, radius));
@@ -66,7 +66,6 @@ double drawTo(const PairPlanes (&blocks)[2], size_t candidates, int radius, Pair
       m[p][k] = finiteFloat(before + static_cast<double>(shares[k]) * (own - before));
     }
   });
-  return planeMean(shares);
 }
 
 void fillBlock(Plane<float>& plane, int column, int row, float value) {
@@ -102,20 +101,17 @@ void solveRow(const PairPlanes& m, int row, WeightMaps& out) {
 
 }  // namespace
 
-ScaleWeights scaleWeights(const Estimate& x, const std::vector<const Estimate*>& candidates, const Features* features) {
+WeightMaps scaleWeights(const Estimate& x, const std::vector<const Estimate*>& candidates, const Features* features) {
   const Plane<float> roots = commonErrorRoots(candidates);
   const PairPlanes blocks[2] = {blockErrors(x, candidates, roots, 0), blockErrors(x, candidates, roots, 1)};
   PairPlanes m;
   for (size_t p = 0; p < blocks[0].size(); ++p)
     m.emplace_back(blocks[0][p].width, blocks[0][p].height,
                    finiteFloat(0.5 * (planeMean(blocks[0][p]) + planeMean(blocks[1][p]))));
-  ScaleWeights out;
-  for (size_t s = 0; s < std::size(kWindows); ++s)
-    out.localShare[s] = drawTo(blocks, candidates.size(), kWindows[s], m);
-  out.maps = uniformWeights(candidates.size(), 1, x.mean.width(), x.mean.height());
-  parallelRows(m[0].height, [&](int row) { solveRow(m, row, out.maps); });
-  out.maps = filteredWeights(out.maps, weightedEstimate(out.maps, candidates), features, kErrorBlock);
-  return out;
+  for (const int radius : kWindows) drawTo(blocks, candidates.size(), radius, m);
+  WeightMaps out = uniformWeights(candidates.size(), 1, x.mean.width(), x.mean.height());
+  parallelRows(m[0].height, [&](int row) { solveRow(m, row, out); });
+  return filteredWeights(out, weightedEstimate(out, candidates), features, kErrorBlock);
 }
 
 }  // namespace braid

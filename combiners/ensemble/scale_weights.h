@@ -7,11 +7,6 @@
 
 namespace braid {
 
-struct ScaleWeights {
-  WeightMaps maps;            // on the simplex, of all channels together
-  double localShare[2] = {};  // mean shares of the windows in what the weights minimise: of the wide and the narrow one
-};
-
 // Minimises wᵀMw with w >= 0 and sum(w) = 1 for blocks of 4x4 pixels (block_errors.h), with errors relative to a common
 // brightness (error_scale.h), and smooths the maps along surfaces. M starts as the mean E of e_i e_j over the image.
 // Windows of about 36, then of about 12 pixels draw it to their own mean,
@@ -20,7 +15,8 @@ struct ScaleWeights {
 // in how much better one candidate is than another, N that of the pairings to their mean, both summed over all pairs
 // of candidates and over neighbouring windows: pairings know nothing of each other's noise. So the wider scale is a
 // prior whose weight follows from the noise of the narrower one (empirical Bayes: the positive part of James and
-// Stein), and with many samples the windows have the last word. All images have halves; the features may be absent.
-ScaleWeights scaleWeights(const Estimate& x, const std::vector<const Estimate*>& candidates, const Features* features);
+// Stein), and with many samples the windows have the last word. One map a candidate, of all channels together. All
+// images have halves; the features may be absent.
+WeightMaps scaleWeights(const Estimate& x, const std::vector<const Estimate*>& candidates, const Features* features);
 
 }  // namespace braid

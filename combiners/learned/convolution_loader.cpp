@@ -5,6 +5,7 @@
 #include <system_error>
 
 #include "combiners/learned/convolution.h"
+#include "renderer/core/module_path.h"
 
 namespace braid {
 
@@ -12,15 +13,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Beside the program where it was built, else where it is installed: relative to the program, which can be moved, or,
-// for programs of others, where it was meant to be.
-fs::path modulePath() {
+// For programs of others, where it was meant to be installed.
+fs::path convolutionModule() {
   std::error_code ignored;
-  const fs::path folder = fs::read_symlink("/proc/self/exe", ignored).parent_path();
-  for (const fs::path& file :
-       {folder / BRAID_CONVOLUTION_MODULE_FILE, folder / BRAID_MODULE_FOLDER / BRAID_CONVOLUTION_MODULE_FILE})
-    if (!folder.empty() && fs::exists(file, ignored)) return file.lexically_normal();
-  return fs::path(BRAID_INSTALLED_MODULES) / BRAID_CONVOLUTION_MODULE_FILE;
+  const fs::path path = modulePath(BRAID_CONVOLUTION_MODULE_FILE, BRAID_MODULE_FOLDER);
+  return fs::exists(path, ignored) ? path : fs::path(BRAID_INSTALLED_MODULES) / BRAID_CONVOLUTION_MODULE_FILE;
 }
 
 struct Opened {
@@ -29,7 +26,7 @@ struct Opened {
 };
 
 Opened openModule() {
-  const fs::path path = modulePath();
+  const fs::path path = convolutionModule();
   std::error_code ignored;
   if (!fs::exists(path, ignored))
     return {nullptr, path.string() + ", which runs networks, does not exist: build braid where oneDNN is installed"};

@@ -103,7 +103,7 @@ std::string CombinePlanner::lacks(const std::string& name, const Needs& needs, b
   if (needs.halves && !e->halves) return fmt::format("needs the halves of {}", name);
   if (!unbiased) return {};
   if (needs.variance && !e->variance) return fmt::format("needs the variance of {}", name);
-  const uint64_t completed = e->passes == 1 && e->variance ? 2 : e->passes;  // has what two passes would show
+  const uint64_t completed = e->unbiased && e->passes == 1 ? 2 : e->passes;  // completed
   if (e->passes > 0 && completed < needs.passes)
     return fmt::format("needs {} of {}, which has {}", plural(needs.passes, "pass", "passes"), name, e->passes);
   if (needs.quarters && !e->quarters) return fmt::format("needs the quarter buffers of {}", name);

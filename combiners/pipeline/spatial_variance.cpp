@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "combiners/pipeline/spatial_variance.h"
-#include "combiners/statistics/surface_smooth.h"
-#include "combiners/pixels/finite_float.h"
 
 #include <algorithm>
 #include <array>
@@ -11,6 +9,8 @@
 
 #include "combiners/pixels/box_mean.h"
 #include "combiners/pipeline/exposure.h"
+#include "combiners/pixels/finite_float.h"
+#include "combiners/statistics/surface_smooth.h"
 #include "renderer/core/hash.h"
 #include "renderer/core/parallel.h"
 

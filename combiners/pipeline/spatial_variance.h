@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Variance and halves for images that come without: one image of another renderer, of which nothing else is known, and
-// the first pass of a render.
-// Neither is as good as what a render knows of itself (combiners/EXPERIMENTS.md, Variance of a single image).
+// Variance and halves for images that come without: the first pass of a render, and one image of another renderer, of
+// which nothing else is known. Neither is as good as what a render of more passes knows of itself
+// (combiners/EXPERIMENTS.md, Variance of a single image).
 #pragma once
 
 #include "renderer/film/estimates.h"

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "renderer/core/error.h"
+#include "renderer/core/module_path.h"
 #include "renderer/images/image_module.h"
 
 namespace braid {
@@ -19,19 +20,9 @@ namespace fs = std::filesystem;
                                           "; install braid again, or put this file of its build beside the program");
 }
 
-// Beside the program where it was built, else where it is installed, relative to the program: both can be moved.
-fs::path modulePath() {
-  std::error_code ignored;
-  const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
-  if (program.empty()) fail(BRAID_IMAGE_MODULE_FILE, "it lies relative to /proc/self/exe, which cannot be read");
-  const fs::path folder = program.parent_path();
-  const fs::path beside = folder / BRAID_IMAGE_MODULE_FILE;
-  if (fs::exists(beside, ignored)) return beside;
-  return (folder / BRAID_IMAGE_MODULE_FOLDER / BRAID_IMAGE_MODULE_FILE).lexically_normal();
-}
-
 const ImageCodecs& openModule() {
-  const fs::path path = modulePath();
+  const fs::path path = modulePath(BRAID_IMAGE_MODULE_FILE, BRAID_IMAGE_MODULE_FOLDER);
+  if (path.empty()) fail(BRAID_IMAGE_MODULE_FILE, "it lies relative to /proc/self/exe, which cannot be read");
   std::error_code ignored;
   if (!fs::exists(path, ignored)) fail(path, "there is no such file");
   // What is missing in its libraries shows now, not when hours have been rendered.

@@ -14,6 +14,7 @@
 #include "combiners/pipeline/external_method.h"
 #include "combiners/pipeline/registry.h"
 #include "renderer/core/error.h"
+#include "renderer/film/make_attribute.h"
 
 namespace braid {
 
@@ -113,7 +114,7 @@ MethodResult Oidn::run(const MethodInputs& in) const {
   MethodResult result;
   const std::string network =
       api_ ? "library" : oidnNetworkName(choiceOf(in), featureImage(albedo, -1), featureImage(normal, -1));
-  result.remarks.push_back({"network", Attribute::Kind::String, network, 0, 0, {}});
+  result.remarks.push_back(textAttribute("network", network));
   result.image.mean = denoise(in.unbiased->mean, featureImage(albedo, -1), featureImage(normal, -1));
   for (int h = 0; h < 2; ++h)
     if (!in.meanOnly && !in.unbiased->half[h].empty() && !in.cancelled())

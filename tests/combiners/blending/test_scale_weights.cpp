@@ -88,10 +88,10 @@ TEST_CASE("Without noise windows decide, under heavy noise the whole image does"
   const Estimate left = noisy(width, height, rightLeft, 0.01, 2), right = noisy(width, height, rightRight, 0.01, 3);
   const auto weightAt = [&](double deviation, int x) {
     const Estimate samples = noisy(width, height, flat, deviation, 4);
-    const ScaleWeights w = scaleWeights(samples, {&left, &right}, nullptr);
-    for (size_t i = 0; i < w.maps.planes[0].size(); ++i)
-      REQUIRE(w.maps.planes[0][i] + w.maps.planes[1][i] == doctest::Approx(1).epsilon(1e-4));
-    return static_cast<double>(w.maps.of(0, 0).at(x, height / 2));
+    const WeightMaps w = scaleWeights(samples, {&left, &right}, nullptr);
+    for (size_t i = 0; i < w.planes[0].size(); ++i)
+      REQUIRE(w.planes[0][i] + w.planes[1][i] == doctest::Approx(1).epsilon(1e-4));
+    return static_cast<double>(w.of(0, 0).at(x, height / 2));
   };
   CHECK(weightAt(0.01, 16) > 0.95);
   CHECK(weightAt(0.01, 144) < 0.05);
@@ -104,9 +104,9 @@ TEST_CASE("From few samples the better of two images is found by the whole image
   const int width = 160, height = 96;
   const Estimate good = noisy(width, height, flat, 0.01, 2), bad = noisy(width, height, brighter, 0.01, 3);
   for (uint32_t seed = 10; seed < 20; ++seed) {
-    const ScaleWeights w = scaleWeights(noisy(width, height, flat, 1, seed), {&good, &bad}, nullptr);
+    const WeightMaps w = scaleWeights(noisy(width, height, flat, 1, seed), {&good, &bad}, nullptr);
     double mean = 0;
-    for (const float v : w.maps.of(0, 0).data) mean += static_cast<double>(v) / (width * height);
+    for (const float v : w.of(0, 0).data) mean += static_cast<double>(v) / (width * height);
     CAPTURE(seed);
     CHECK(mean > 0.7);
   }
@@ -119,10 +119,10 @@ TEST_CASE("Extreme images: finite weights on the simplex") {
       for (Rgb<float>* image : {&e->mean, &e->half[0], &e->half[1]})
         for (size_t c = 0; c < 3; ++c)
           for (float& v : (*image)[c].data) v = static_cast<float>(static_cast<double>(v) * scale);
-    const ScaleWeights w = scaleWeights(x, {&x, &y, &y}, nullptr);
+    const WeightMaps w = scaleWeights(x, {&x, &y, &y}, nullptr);
     for (size_t i = 0; i < 15; ++i) {
       double sum = 0;
-      for (const Plane<float>& plane : w.maps.planes) {
+      for (const Plane<float>& plane : w.planes) {
         REQUIRE(std::isfinite(plane[i]));
         CHECK(plane[i] >= 0);
         sum += static_cast<double>(plane[i]);

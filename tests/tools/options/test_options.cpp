@@ -246,6 +246,7 @@ TEST_CASE("The help of a method has its options and no others") {
   const std::string box = helpOf({"render", "-h", "box"}), all = helpOf({"combine", "--help-methods"});
   CHECK(contains(box, "--box-radius"));
   CHECK_FALSE(contains(box, "--nlm-window"));
+  CHECK(contains(helpOf({"render", "-h", "oidn"}), "--oidn-weights FOLDER"));
   CHECK(helpOf({"render", "x.glb", "--help", "js@box"}) == helpOf({"render", "-h", "js"}));
   for (const OptionInfo& info : allMethodOptions()) CHECK(contains(all, "--" + info.name));
   for (const auto& m : makeMethods()) CHECK(contains(all, std::string(m->name()) + ": "));
