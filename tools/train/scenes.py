@@ -4,8 +4,8 @@
 
     scenes.py FIRST END FOLDER      writes FOLDER/K.glb and K.json, and K_env.hdr where there is one, for K in FIRST:END
 
-K.json holds "kind" (room, outdoor or studio), "options" (of braid render) and "cameras", a list of "look_at" and "yfov",
-for --look-at and --yfov. Needs numpy. One seed always gives the same bytes.
+K.json holds "kind" (room, outdoor, studio or abstract), "options" (of braid render) and "cameras", a list of "look_at"
+and "yfov", for --look-at and --yfov. Needs numpy. One seed always gives the same bytes.
 """
 
 import json
@@ -19,10 +19,11 @@ for folder in (HERE, HERE.parents[1] / "scenes"):
     if str(folder) not in sys.path:
         sys.path.insert(0, str(folder))
 
-from scenery import outdoors, rooms, skies, studios  # noqa: E402  (found by the paths above)
+from scenery import abstract, outdoors, rooms, skies, studios  # noqa: E402  (found by the paths above)
 from scenery.stage import Stage  # noqa: E402
 
-KINDS = (("room", rooms.build, 0.60), ("outdoor", outdoors.build, 0.22), ("studio", studios.build, 0.18))
+KINDS = (("room", rooms.build, 0.54), ("outdoor", outdoors.build, 0.22), ("studio", studios.build, 0.15),
+         ("abstract", abstract.build, 0.09))
 CAMERAS, ATTEMPTS = 3, 20
 
 

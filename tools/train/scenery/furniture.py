@@ -8,7 +8,7 @@ import numpy as np
 from generator.shapes import icosphere
 
 from . import textures
-from .meshes import (Mesh, box, creased, cylinder, from_generator, grid, lathe, merged, quad, rod, rotate, scale, slab,
+from .meshes import (Mesh, box, cylinder, from_generator, grid, lathe, merged, quad, rod, rotate, slab,
                      sphere, superellipsoid, torus, tubes)
 
 
@@ -52,7 +52,8 @@ def sofa(stage, place):
     rng = stage.rng
     w, d, arm = rng.uniform(1.0, 2.2), rng.uniform(0.75, 0.95), rng.uniform(0.12, 0.22)
     cloth = stage.materials.cloth() if rng.uniform() < 0.7 else stage.materials.any()
-    parts = [superellipsoid((w, 0.3, d), 0.15).at(0, 0.22, 0), superellipsoid((w, 0.6, 0.22), 0.2).at(0, 0.5, -d / 2 + .1)]
+    parts = [superellipsoid((w, 0.3, d), 0.15).at(0, 0.22, 0),
+             superellipsoid((w, 0.6, 0.22), 0.2).at(0, 0.5, -d / 2 + .1)]
     parts += [superellipsoid((arm, 0.5, d), 0.25).at(x, 0.35, 0) for x in (-w / 2 + arm / 2, w / 2 - arm / 2)]
     seats = max(1, int(w / 0.7))
     size = (w - 2 * arm) / seats
@@ -96,7 +97,8 @@ def bookshelf(stage, place):
             if x + t > end:
                 break
             tall, deep = min(gap * 0.88, rng.uniform(0.16, 0.3)), rng.uniform(0.5, 0.9) * d
-            groups[rng.integers(6)].append(box((x, y, d / 2 - deep - 0.01), (x + t - 0.001, y + tall * 0.95, d / 2 - 0.02)))
+            groups[rng.integers(6)].append(box((x, y, d / 2 - deep - 0.01),
+                                               (x + t - 0.001, y + tall * 0.95, d / 2 - 0.02)))
             x += t
     for books in groups:
         if books:
@@ -135,13 +137,15 @@ def pillar(stage, place):
 def plant(stage, place):
     rng = stage.rng
     pot, r = rng.uniform(0.15, 0.4), rng.uniform(0.1, 0.22)
-    stage.add(lathe([(0, 0), (r * 0.7, 0), (r, pot), (r * 0.9, pot), (r * 0.85, pot * 0.9), (0, pot * 0.9)]).moved(place),
+    stage.add(lathe([(0, 0), (r * 0.7, 0), (r, pot), (r * 0.9, pot), (r * 0.85, pot * 0.9),
+                     (0, pot * 0.9)]).moved(place),
               stage.materials.any())
     stems = int(rng.integers(12, 90))
     t = np.linspace(0, 1, 6)
     out = rng.normal(size=(stems, 2)) * rng.uniform(0.1, 0.4)
     height = rng.uniform(0.3, 1.2) * rng.uniform(0.6, 1, stems)
-    paths = np.stack([out[:, :1] * t ** 1.7, pot * 0.9 + height[:, None] * t * (1 - 0.25 * t), out[:, 1:] * t ** 1.7], -1)
+    paths = np.stack([out[:, :1] * t ** 1.7, pot * 0.9 + height[:, None] * t * (1 - 0.25 * t), out[:, 1:] * t ** 1.7],
+                     -1)
     blades = _blades(paths, rng.uniform(0.01, 0.06) * np.sin(math.pi * np.clip(t * 0.9 + 0.08, 0, 1)))
     stage.add(blades.moved(place), stage.materials.thin() if rng.uniform() < 0.6 else stage.materials.plastic())
 
@@ -239,7 +243,8 @@ def wires(stage, place):
     heading[:, 1] = np.abs(heading[:, 1]) + 0.5
     curl = rng.uniform(0.003, 0.03)
     a = rng.uniform(0, 6.3, (count, 1)) + rng.uniform(5, 40) * t
-    paths = heading[:, None] * t[:, None] * rng.uniform(0.1, 0.3) + np.stack([curl * np.cos(a), 0 * a, curl * np.sin(a)], -1)
+    paths = heading[:, None] * t[:, None] * rng.uniform(0.1, 0.3) + np.stack([curl * np.cos(a), 0 * a,
+                                                                              curl * np.sin(a)], -1)
     paths[:, :, 1] = np.abs(paths[:, :, 1] - rng.uniform(0, 0.25) * t ** 2) + 0.004
     radii = np.full((count, steps), rng.uniform(0.0006, 0.006))
     stage.add(tubes(paths, radii, 4).moved(place), stage.materials.any())

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from . import textures
-from .meshes import box, creased, cylinder, lathe, merged, quad, rod, rotate, slab, sphere, torus, translate, tubes
+from .meshes import box, creased, lathe, merged, quad, rod, rotate, slab, sphere, torus, translate, tubes
 
 
 def lamp_color(rng, colorful=0.2):
@@ -35,7 +35,8 @@ def panels(stage, room, flux):
     for _ in range(n):
         x, z = _spot(rng, room, 0.8)
         stage.emit(quad((x - w / 2, top - 0.03, z - d / 2), (w, 0, 0), (0, 0, d)), flux / n, color, solid=False)
-        stage.add(box((x - w / 2 - 0.01, top - 0.028, z - d / 2 - 0.01), (x + w / 2 + 0.01, top - 0.001, z + d / 2 + .01)),
+        stage.add(box((x - w / 2 - 0.01, top - 0.028, z - d / 2 - 0.01),
+                      (x + w / 2 + 0.01, top - 0.001, z + d / 2 + .01)),
                   stage.materials.plastic())
 
 
@@ -76,7 +77,8 @@ def uplights(stage, room, flux):
         y = rng.uniform(1.3, max(1.4, min(1.9, room[1][1] - 0.6)))
         r = rng.uniform(0.08, 0.22)
         stage.add(lathe([(0.02, 0), (r * 0.8, 0.05), (r, 0.14)], 30).at(x, y, z), stage.materials.metal())
-        stage.emit(cylinder(r * rng.uniform(0.1, 0.6), 0.02, 20).at(x, y + 0.05, z), flux, lamp_color(rng, 0.1))
+        stage.emit(lathe([(r * rng.uniform(0.1, 0.6), 0), (0, 0)], 20).at(x, y + 0.07, z), 1.5 * flux,
+                   lamp_color(rng, 0.1))
         stage.add(rod((x, 0, z), (x, y + 0.02, z), 0.015), stage.materials.metal())
 
 
@@ -100,10 +102,10 @@ def cove(stage, room, flux):
         stage.add(box((lip_low[0], y, lip_low[1]), (lip_high[0], y + 0.06, lip_high[1])), stage.materials.plain())
         middle = [(a + b) / 2 for a, b in zip(low, high)]
         if axis == 1:
-            strip = box((low[0] + 0.05, y, middle[1] - 0.008), (high[0] - 0.05, y + 0.012, middle[1] + 0.008))
+            strip = quad((low[0] + 0.05, y + 0.01, middle[1] + 0.01), (high[0] - low[0] - 0.1, 0, 0), (0, 0, -0.02))
         else:
-            strip = box((middle[0] - 0.008, y, low[1] + 0.05), (middle[0] + 0.008, y + 0.012, high[1] - 0.05))
-        stage.emit(strip, flux / len(sides), color)
+            strip = quad((middle[0] - 0.01, y + 0.01, high[1] - 0.05), (0.02, 0, 0), (0, 0, low[1] - high[1] + 0.1))
+        stage.emit(strip, 2 * flux / len(sides), color, solid=False)
 
 
 def fluorescent(stage, room, flux):
@@ -131,7 +133,8 @@ def screen(stage, room, flux):
     strength = float(flux / (math.pi * w * h * 0.3))
     material = stage.scene.diffuse("screen", (0.02, 0.02, 0.02), emission=(strength,) * 3, emission_map=image)
     stage.add(quad((-w / 2, 0, 0.02), (w, 0, 0), (0, h, 0), fit=True).moved(place), (material, 1.0), fit=True)
-    stage.add(box((-w / 2 - 0.03, -0.03, -0.03), (w / 2 + 0.03, h + 0.03, 0.015)).moved(place), stage.materials.plastic())
+    stage.add(box((-w / 2 - 0.03, -0.03, -0.03), (w / 2 + 0.03, h + 0.03, 0.015)).moved(place),
+              stage.materials.plastic())
 
 
 def chain(stage, room, flux):
@@ -150,7 +153,8 @@ def chain(stage, room, flux):
     for k in range(colors):
         part = points[k::colors]
         if len(part):
-            stage.emit(merged(sphere(r, 8, 6).at(*p) for p in part), flux * len(part) / len(points), lamp_color(rng, 0.9),
+            stage.emit(merged(sphere(r, 8, 6).at(*p) for p in part), flux * len(part) / len(points),
+                       lamp_color(rng, 0.9),
                        solid=False)
 
 
@@ -168,7 +172,8 @@ def neon(stage, room, flux):
         if rng.uniform() < 0.5:
             path = np.stack([np.full(40, x0 + 0.06), path[:, 1], z + path[:, 0] - x], -1)
         path = np.clip(path, (x0 + 0.05, 0.1, z0 + 0.05), (x1 - 0.05, top - 0.05, z1 - 0.05))
-        stage.emit(tubes([path], [np.full(40, rng.uniform(0.006, 0.02))], 8), flux / 2, lamp_color(rng, 1.0), solid=False)
+        stage.emit(tubes([path], [np.full(40, rng.uniform(0.006, 0.02))], 8), flux / 2, lamp_color(rng, 1.0),
+                   solid=False)
 
 
 def points(stage, room, flux):

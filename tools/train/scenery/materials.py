@@ -60,11 +60,12 @@ class Materials:
         options = {"normal_map": self.bump()} if self.rng.uniform() < 0.25 else {}
         return self.scene.diffuse("pattern", (1, 1, 1), color_map=self.color_map(kinds), **options), self.tile()
 
-    def plastic(self, roughness=None):
+    def plastic(self, roughness=None, **limits):
         r = self.rng.uniform(0.02, 0.9) if roughness is None else roughness
         if self.rng.uniform() < 0.3:
-            return self.scene.material("glossy pattern", (1, 1, 1), roughness=r, color_map=self.color_map()), self.tile()
-        return self.scene.material("plastic", self.color(), roughness=r), 1.0
+            return self.scene.material("glossy pattern", (1, 1, 1), roughness=r,
+                                       color_map=self.color_map()), self.tile()
+        return self.scene.material("plastic", self.color(**limits), roughness=r), 1.0
 
     def metal(self, roughness=None):
         r = float(self.rng.choice([0.02, 0.1, 0.2, 0.35, 0.5, 0.8])) if roughness is None else roughness
@@ -100,13 +101,14 @@ class Materials:
 
     def wood(self):
         r = self.rng.uniform(0.15, 1.0)
-        return self.scene.material("wood", (1, 1, 1), roughness=r, color_map=self.color_map([textures.wood])), self.tile()
+        return self.scene.material("wood", (1, 1, 1), roughness=r,
+                                   color_map=self.color_map([textures.wood])), self.tile()
 
     def film(self):
         return self.scene.material(
-            "thin film", self.color(), metallic=float(self.rng.integers(2)), roughness=float(self.rng.uniform(0.05, 0.5)),
-            KHR_materials_iridescence={"iridescenceFactor": 1.0, "iridescenceThicknessMaximum": float(
-                self.rng.uniform(200, 800))}), 1.0
+            "thin film", self.color(), metallic=float(self.rng.integers(2)),
+            roughness=float(self.rng.uniform(0.05, 0.5)), KHR_materials_iridescence={
+                "iridescenceFactor": 1.0, "iridescenceThicknessMaximum": float(self.rng.uniform(200, 800))}), 1.0
 
     def thin(self):
         """Paper, leaves, lamp shades and curtains: lets diffuse light through."""
@@ -125,6 +127,35 @@ class Materials:
         r = 0.0 if self.rng.uniform() < 0.7 else float(self.rng.uniform(0.05, 0.5))
         return self.scene.glass("glass", float(self.rng.uniform(1.3, 1.7)), roughness=r, **options), 1.0
 
+    def sheet(self):
+        """With holes: grilles, lace, netting."""
+        return self.scene.material("sheet", (1, 1, 1), roughness=float(self.rng.uniform(0.2, 1)),
+                                   metallic=float(self.rng.integers(2)), mask=0.5,
+                                   color_map=self._texture(textures.holes(self.rng))), self.tile()
+
+    def lustre(self):
+        """Dielectrics of other indices of refraction and specular tints: from dull rubber to lacquer."""
+        options = {"KHR_materials_ior": {"ior": float(self.rng.uniform(1.1, 2.4))}}
+        if self.rng.uniform() < 0.4:
+            options["KHR_materials_specular"] = {"specularFactor": float(self.rng.uniform(0.2, 1)),
+                                                 "specularColorFactor": list(self.color(value=(0.4, 1)))}
+        if self.rng.uniform() < 0.4:
+            options["normal_map"] = self.bump()
+        return self.scene.material("lustre", self.color(), roughness=float(self.rng.uniform(0.02, 0.7)),
+                                   **options), self.tile()
+
+    def worn(self):
+        """Metal that shows through paint by a texture, and coats over textures."""
+        if self.rng.uniform() < 0.5:
+            t = textures.fractal(self.rng, 128, int(self.rng.integers(3, 16)), 4) > self.rng.uniform(0.4, 0.6)
+            rough = np.where(t, self.rng.uniform(0.05, 0.5), self.rng.uniform(0.3, 1))
+            index = self._texture(np.stack([0 * rough, rough, t * 1.0], axis=-1))
+            return self.scene.material("worn", self.color(), metallic=1.0, roughness=1.0,
+                                       metal_rough_map=index), self.tile()
+        coat = {"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": float(self.rng.uniform(0, 0.2))}
+        return self.scene.material("lacquer", (1, 1, 1), roughness=float(self.rng.uniform(0.3, 1)),
+                                   color_map=self.color_map(), KHR_materials_clearcoat=coat), self.tile()
+
     def pane(self):
         tint = (1, 1, 1) if self.rng.uniform() < 0.7 else self.color(value=(0.6, 1))
         return self.scene.material("pane", tint, roughness=0.0,
@@ -136,14 +167,15 @@ class Materials:
     def any(self, closed=False):
         """Whatever there is; glass only for closed meshes."""
         families = [(self.matte, 22), (self.matte_textured, 22), (self.plastic, 16), (self.metal, 12), (self.coated, 5),
-                    (self.cloth, 6), (self.wood, 6), (self.film, 2), (self.thin, 2)]
+                    (self.cloth, 6), (self.wood, 6), (self.film, 2), (self.thin, 2),
+                    (self.lustre, 6), (self.worn, 5)]
         if closed:
             families.append((self.glass, 6))
         weights = np.array([w for _, w in families], float)
         return families[self.rng.choice(len(families), p=weights / weights.sum())][0]()
 
     def plain(self):
-        """What walls and large things are mostly made of."""
+        """What walls and large things are mostly made of; seldom dark, or little light would reach most of a room."""
         k = self.rng.uniform()
-        return (self.matte(value=(0.3, 0.95)) if k < 0.45 else self.matte_textured() if k < 0.75 else
-                self.wood() if k < 0.87 else self.plastic(float(self.rng.uniform(0.15, 0.8))))
+        return (self.matte(value=(0.45, 0.97)) if k < 0.45 else self.matte_textured() if k < 0.75 else
+                self.wood() if k < 0.87 else self.plastic(float(self.rng.uniform(0.15, 0.8)), value=(0.35, 0.95)))

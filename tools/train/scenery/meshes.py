@@ -56,6 +56,15 @@ class Mesh:
         out.uvs = np.asarray(uvs, np.float32)
         return out
 
+    def welded(self):
+        """Without normals and uvs, each point once: a third of the bytes of flat meshes."""
+        rows = np.ascontiguousarray(self.points).view([("", np.float32)] * 3).reshape(-1)
+        _, first, number = np.unique(rows, return_index=True, return_inverse=True)
+        out = Mesh.__new__(Mesh)
+        out.points, out.faces = self.points[first], number.reshape(-1)[self.faces]
+        out.flat, out.textured, out.normals, out.uvs = True, False, None, None
+        return out
+
     def bounds(self):
         return self.points.min(axis=0), self.points.max(axis=0)
 

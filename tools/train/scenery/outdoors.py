@@ -8,7 +8,7 @@ import numpy as np
 from generator import plants
 
 from . import furniture, lamps, skies, textures
-from .meshes import Mesh, box, cards, cylinder, from_generator, grid, lathe, merged, quad, rotate, scale, slab, sphere
+from .meshes import Mesh, box, cards, from_generator, grid, merged, quad, rotate, scale, slab, sphere
 from .meshes import superellipsoid, translate, tubes, unit
 
 
@@ -21,7 +21,8 @@ class Ground:
 
     def height(self, x, z):
         f, p = self.waves, self.phase
-        return self.lift * 0.4 * (np.sin(f[0] * x + p[0]) * np.sin(f[1] * z + p[1]) + 0.5 * np.sin(f[2] * (x + z) + p[2]))
+        return self.lift * 0.4 * (np.sin(f[0] * x + p[0]) * np.sin(f[1] * z + p[1]) + 0.5
+                                  * np.sin(f[2] * (x + z) + p[2]))
 
     def mesh(self):
         x = np.linspace(-4, 4, 90) ** 3 / 16 * self.size
@@ -73,7 +74,7 @@ def _leaf_sites(rng, skeleton, count):
 def _grass(stage, ground, radius):
     """Blades as thin triangles: more detail than pixels."""
     rng = stage.rng
-    count, height = int(rng.integers(4000, 20000)), rng.uniform(0.04, 0.5)
+    count, height = int(rng.integers(3000, 14000)), rng.uniform(0.04, 0.5)
     r, a = radius * np.sqrt(rng.uniform(size=count)), rng.uniform(0, 2 * math.pi, count)
     x, z = r * np.cos(a), r * np.sin(a)
     root = np.stack([x, ground.height(x, z), z], -1)
@@ -93,7 +94,7 @@ def _grass(stage, ground, radius):
 def _fur(stage, place):
     """A body that is covered with thin glossy tubes."""
     rng = stage.rng
-    count, steps = int(rng.integers(800, 4000)), 6
+    count, steps = int(rng.integers(600, 2300)), 6
     n = unit(rng.normal(size=(count, 3)))
     t = np.linspace(0, 1, steps)[:, None]
     length, fall = rng.uniform(0.1, 0.5), rng.uniform(0, 1)
@@ -137,7 +138,8 @@ def _house(stage, place):
         z = d / 2 + e
         for side in (-1, 1):
             roof = quad((-w / 2 - e, h - 0.25, side * z), (w + 2 * e, 0, 0), (0, top - h + 0.25, -side * z))
-            stage.add(roof.moved(place), mats.matte_textured([textures.bricks]) if rng.uniform() < 0.5 else mats.plain())
+            stage.add(roof.moved(place), mats.matte_textured([textures.bricks]) if rng.uniform() < 0.5
+                      else mats.plain())
         gable = [[(s * w / 2, h, -d / 2), (s * w / 2, h, d / 2), (s * w / 2, top - 0.3, 0)] for s in (-1, 1)]
         stage.add(Mesh(gable, [[0, 2, 1], [3, 4, 5]]).moved(place), mats.plain())
     frames, panes = [], []
@@ -152,6 +154,90 @@ def _house(stage, place):
             stage.emit(merged(panes).moved(place), rng.uniform(5, 100), lamps.lamp_color(rng, 0.1))
         else:
             stage.add(merged(panes).moved(place), mats.plastic(0.02) if rng.uniform() < 0.7 else mats.metal(0.02))
+
+
+def _pergola(stage, place):
+    """Beams on posts, whose shadows fall in stripes."""
+    rng = stage.rng
+    w, d, h = rng.uniform(1.5, 4), rng.uniform(1.5, 4), rng.uniform(2, 2.8)
+    parts = [box((x - 0.05, -0.3, z - 0.05), (x + 0.05, h, z + 0.05)) for x in (-w / 2, w / 2) for z in (-d / 2, d / 2)]
+    parts += [box((-w / 2 - .2, h, z - .03), (w / 2 + .2, h + .12, z + .03)) for z in (-d / 2, d / 2)]
+    parts += [box((x, h + 0.12, -d / 2 - .3), (x + 0.05, h + 0.2, d / 2 + .3))
+              for x in np.arange(-w / 2, w / 2, rng.uniform(0.12, 0.5))]
+    stage.add(merged(parts).moved(place), stage.materials.wood() if rng.uniform() < 0.6 else stage.materials.any(),
+              solid=False)
+
+
+def _water(stage, ground):
+    """A rippled mirror-like surface, low in the ground: it shows the sky, and no floor that paths would hardly find."""
+    rng, size = stage.rng, ground.size
+    x, z = np.meshgrid(np.linspace(-size, size, 80), np.linspace(-size, size, 80))
+    f = rng.normal(0, rng.uniform(2, 8), (5, 2))
+    y = sum(np.sin(a * x + b * z + p) for (a, b), p in zip(f, rng.uniform(0, 6, 5))) * rng.uniform(0.0005, 0.006)
+    level = rng.uniform(-0.2, 0.15) * max(ground.lift, 0.2)
+    surface = grid(np.stack([x, y + level, z], -1), flip=True)
+    color = stage.materials.color(value=(0.05, 0.4))
+    stage.add(surface, (stage.scene.material("water", color, roughness=float(rng.choice([0.02, 0.05, 0.15]))), 1.0),
+              solid=False)
+
+
+def _flowers(stage, ground, radius):
+    """Stalks with coloured heads."""
+    rng = stage.rng
+    n = int(rng.integers(30, 300))
+    x, z = rng.normal(0, radius / 2, (2, n))
+    root = np.stack([x, ground.height(x, z), z], -1)
+    head = root + np.stack([rng.normal(0, 0.04, n), rng.uniform(0.15, 0.6, n), rng.normal(0, 0.04, n)], -1)
+    stage.add(tubes(np.stack([root, head], 1), np.full((n, 2), 0.004), 4), stage.materials.matte(), solid=False)
+    kinds = int(rng.integers(1, 4))
+    bloom = sphere(rng.uniform(0.02, 0.05), 8, 5)
+    for k in range(kinds):
+        petals = [bloom.at(*p) for p in head[k::kinds]]
+        stage.add(merged(petals), stage.materials.matte(saturation=(0.4, 1)), solid=False)
+
+
+def _boxes(stage, place):
+    """A stack of crates, or blocks of a ruin."""
+    rng, parts = stage.rng, []
+    for row in range(int(rng.integers(1, 5))):
+        for k in range(int(rng.integers(1, 5 - row)) if row < 4 else 1):
+            s = rng.uniform(0.3, 0.6)
+            parts.append(slab(s, 0.5, s).moved(rotate(1, rng.normal(0, 12))).at(k * 0.65, row * 0.5,
+                                                                                rng.normal(0, 0.03)))
+    for k in range(2):
+        if parts[k::2]:
+            stage.add(merged(parts[k::2]).moved(place), stage.materials.any())
+
+
+def _paving(stage, ground):
+    """A path of slabs."""
+    rng = stage.rng
+    n, turn = int(rng.integers(8, 40)), rng.uniform(0, 360)
+    stones = []
+    for k in range(n):
+        at = rotate(1, turn) @ np.array([rng.normal(0, 0.05), 0, (k - n / 2) * 0.5, 1])
+        x, z = at[0] + 0.4 * math.sin(k * 0.3), at[2]
+        stones.append(slab(rng.uniform(0.35, 0.6), 0.08, 0.42).moved(rotate(1, turn + rng.normal(0, 6))).at(
+            x, float(ground.height(x, z)) - 0.03, z))
+    stage.add(merged(stones), stage.materials.plain(), solid=False)
+
+
+def _wires(stage, ground):
+    """Lines that sag between posts, thin against the sky; washing may hang on them."""
+    rng, size = stage.rng, ground.size
+    x = np.array([-size * 0.6, size * 0.6])
+    z, h = rng.uniform(-0.5, 0.3) * size, rng.uniform(2, 4)
+    for end in x:
+        stage.add(box((end - 0.06, -1, z - 0.06), (end + 0.06, h + 0.3, z + 0.06)), stage.materials.wood())
+    t = np.linspace(0, 1, 24)
+    for k in range(int(rng.integers(1, 5))):
+        y = h - 0.12 * k - rng.uniform(0.2, 0.7) * 4 * t * (1 - t)
+        path = np.stack([x[0] + (x[1] - x[0]) * t, y, 0 * t + z + 0.05 * k], -1)
+        stage.add(tubes([path], [np.full(24, rng.uniform(0.003, 0.012))], 5), stage.materials.matte(), solid=False)
+    if rng.uniform() < 0.5:
+        for j in rng.permutation(20)[:6] + 2:
+            w, drop = rng.uniform(0.3, 0.8), rng.uniform(0.4, 1.0)
+            stage.add(quad(path[j] - (w / 2, drop, 0), (w, 0, 0), (0, drop, 0)), stage.materials.cloth(), solid=False)
 
 
 def _rocks(stage, ground, spread):
@@ -173,7 +259,8 @@ def _light(stage, size):
     if k < 0.78:
         stage.environment = skies.daylight(rng, k < 0.6)
         if k > 0.6 and rng.uniform() < 0.5:
-            stage.light("directional", (0, 0, 0), rng.normal(size=3) * (1, 0.1, 1) - (0, 0.8, 0), lamps.lamp_color(rng, 0),
+            stage.light("directional", (0, 0, 0), rng.normal(size=3) * (1, 0.1, 1) - (0, 0.8, 0),
+                        lamps.lamp_color(rng, 0),
                         rng.uniform(1, 10))
         stage.options += ["--env-scale", f"{math.exp(rng.normal(0, 0.6)):.3f}"]
         return
@@ -213,6 +300,14 @@ def build(stage):
     if rng.uniform() < 0.4 and size > 4:
         _house(stage, translate(0, 0, -size * 0.8) @ translate(rng.normal(0, 2), 0, 0) @ rotate(1, rng.normal(0, 25)))
         stage.interest.append((0, 1.5, -size * 0.8))
+    for kind, chance in ((_pergola, 0.12), (_boxes, 0.3)):
+        if rng.uniform() < chance:
+            kind(stage, spot(0.25))
+    for kind, chance in ((_water, 0.12), (_paving, 0.2), (_wires, 0.15)):
+        if rng.uniform() < chance:
+            kind(stage, ground)
+    if rng.uniform() < 0.2:
+        _flowers(stage, ground, size * 0.5)
     if rng.uniform() < 0.5:
         _rocks(stage, ground, size * 0.5)
     for _ in range(int(rng.integers(0, 4))):

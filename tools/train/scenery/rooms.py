@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from . import furniture, lamps, skies
+from . import fittings, furniture, lamps, skies
 from .meshes import box, merged, quad, rotate, slab, translate
 
 # Metres that a thing needs around its middle, and whether it stands with its back to a wall.
@@ -82,30 +82,33 @@ def _window(stage, wall):
         stage.add(merged(slats).moved(wall.place), mats.matte(value=(0.5, 0.95)), solid=False)
 
 
-def _door(stage, wall, x=None):
-    """A doorway whose leaf stands ajar, wide open or is missing."""
+def _door(stage, wall, angles=(4, 10, 25, 50, 85, 110)):
+    """A doorway whose leaf stands ajar by some degrees, or is missing."""
     rng = stage.rng
     w, h = rng.uniform(0.7, 1.1), min(rng.uniform(1.9, 2.2), wall.height - 0.1)
     half = max((wall.length - w) / 2 - wall.thickness - 0.15, 0)
-    x = rng.uniform(-half, half) if x is None else x
+    x = rng.uniform(-half, half)
     if not wall.hole(x - w / 2, 0, x + w / 2, h):
         return
     if rng.uniform() < 0.8:
-        angle = float(rng.choice([4, 10, 25, 50, 85, 110]))
+        angle = float(rng.choice(angles))
         leaf = box((0, 0.01, -0.04), (w - 0.01, h - 0.01, 0))
         side = rng.choice([-1, 1])
-        place = wall.place @ translate(x - w / 2, 0, 0 if side < 0 else -wall.thickness + 0.04) @ rotate(1, side * angle)
+        place = wall.place @ translate(x - w / 2, 0, 0 if side < 0
+                                       else -wall.thickness + 0.04) @ rotate(1, side * angle)
         stage.add(leaf.moved(place), stage.materials.plain())
         knob = merged([box((w - 0.12, 1.0, z), (w - 0.04, 1.02, z + 0.02)) for z in (0.02, -0.08)])
         stage.add(knob.moved(place), stage.materials.metal())
-    frame = [box((x - w / 2 - 0.06, 0, 0), (x - w / 2, h + 0.06, 0.02)), box((x + w / 2, 0, 0), (x + w / 2 + 0.06, h + 0.06,
+    frame = [box((x - w / 2 - 0.06, 0, 0), (x - w / 2, h + 0.06, 0.02)),
+             box((x + w / 2, 0, 0), (x + w / 2 + 0.06, h + 0.06,
              0.02)), box((x - w / 2, h, 0), (x + w / 2, h + 0.06, 0.02))]
     stage.add(merged(frame).moved(wall.place), stage.materials.plain(), solid=False)
 
 
 def _furnish(stage, walls, w, d, h):
-    """Large things that keep out of each other's way, small ones on top of them, flat ones on the walls."""
-    rng, taken = stage.rng, []
+    """Large things that keep out of each other's way, small ones on top of them, flat ones on the walls. Returns where
+    there is room on top of things."""
+    rng, taken, tops = stage.rng, [], []
     for _ in range(int(rng.integers(2, 6 + int(w * d / 5)))):
         kind = furniture.FURNITURE[rng.integers(len(furniture.FURNITURE))]
         radius, at_wall = NEEDS[kind]
@@ -129,10 +132,12 @@ def _furnish(stage, walls, w, d, h):
             top = kind(stage, place)
             stage.interest.append((*spot[:1], rng.uniform(0.3, 1.0), *spot[1:]))
             if top is not None and top[0] < h - 0.3:
-                clutter(stage, place @ translate(0, top[0], 0), top[1], top[2])
+                tops.append(place @ translate(0, top[0], 0))
+                clutter(stage, tops[-1], top[1], top[2])
             break
     for wall in walls:
         _hang(stage, wall)
+    return tops
 
 
 def clutter(stage, place, half_x, half_z, most=6):
@@ -157,13 +162,13 @@ def _hang(stage, wall):
 
 
 def _partition(stage, w, d, h):
-    """A wall across the room, full or with a gap beside or above it; returns its x."""
+    """A wall across the room, full with an open doorway or with a gap beside or above it; returns its x."""
     rng = stage.rng
     x = rng.uniform(-0.2, 0.2) * w
     k = rng.uniform()
     if k < 0.6:
         wall = Wall(translate(x, 0, 0) @ rotate(1, 90), d, h, 0.1)
-        _door(stage, wall)
+        _door(stage, wall, (15, 30, 50, 85, 110))
     elif k < 0.8:
         length = d * rng.uniform(0.5, 0.85)
         wall = Wall(translate(x, 0, (d - length) / 2 * rng.choice([-1, 1])) @ rotate(1, 90), length, h, 0.1)
@@ -201,7 +206,8 @@ def _light(stage, room, dark_side):
     flux = area * math.exp(rng.uniform(-1, 1.5))
     lit = room
     if dark_side is not None:
-        lit = ((dark_side + 0.1, 0, z0), (x1, h, z1)) if stage.inside[1][0] < x1 - 0.5 else ((x0, 0, z0), (dark_side - 0.1,
+        lit = ((dark_side + 0.1, 0, z0),
+               (x1, h, z1)) if stage.inside[1][0] < x1 - 0.5 else ((x0, 0, z0), (dark_side - 0.1,
                                                                                                     h, z1))
         flux *= 3
     k = rng.uniform()
@@ -212,10 +218,25 @@ def _light(stage, room, dark_side):
     else:
         for _ in range(int(rng.choice([1, 2, 3], p=[0.55, 0.3, 0.15]))):
             lamps.LAMPS[rng.integers(len(lamps.LAMPS))](stage, lit, flux * math.exp(rng.normal(0, 0.7)))
+    if dark_side is not None and rng.uniform() < 0.5:
+        # A glimmer on the dark side, or some of its corners would stay black for any number of samples.
+        x, z = rng.uniform(stage.inside[:, 0].min(), stage.inside[:, 0].max()), rng.uniform(z0 + 0.3, z1 - 0.3)
+        fittings.candles(stage, translate(x, 0.02, z), flux * 0.02)
     if rng.uniform() < 0.12:
         lamps.screen(stage, room, flux * 0.05)
     if rng.uniform() < 0.08:
         lamps.chain(stage, room, flux * 0.1)
+
+
+def _small_lights(stage, tops, walls, area):
+    """Lamps on tables and walls, at times in place of daylight, mostly beside it."""
+    rng = stage.rng
+    flux = area * math.exp(rng.uniform(-1, 1.5))
+    for place in tops:
+        if rng.uniform() < 0.2:
+            (fittings.table_lamp if rng.uniform() < 0.7 else fittings.candles)(stage, place, flux)
+    if rng.uniform() < 0.12:
+        fittings.sconce(stage, walls[rng.integers(4)], flux)
 
 
 def build(stage):
@@ -232,7 +253,7 @@ def build(stage):
             _window(stage, walls[first if k % 2 == 0 else rng.integers(4)])
     # Windows too small to light a room leave nothing but noise: then lamps help.
     area = sum((x1 - x0) * (y1 - y0) for wall in walls for x0, y0, x1, y1 in wall.holes)
-    bright = daylight and area > 0.12 * w * d
+    bright = daylight and area > 0.2 * w * d
     if rng.uniform() < 0.4:
         _door(stage, walls[rng.integers(4)])
     partition = _partition(stage, w, d, h) if min(w, d) > 3.2 and rng.uniform() < 0.3 else None
@@ -245,12 +266,16 @@ def build(stage):
         stage.add(wall.mesh(), same or mats.plain(), shell=True)
     t = walls[0].thickness
     stage.add(box((-w / 2 - t, -0.1, -d / 2 - t), (w / 2 + t, 0, d / 2 + t)), mats.plain(), shell=True)
-    stage.add(box((-w / 2 - t, h, -d / 2 - t), (w / 2 + t, h + 0.1, d / 2 + t)), mats.matte(value=(0.6, 0.98)), shell=True)
-    _furnish(stage, walls, w, d, h)
+    stage.add(box((-w / 2 - t, h, -d / 2 - t), (w / 2 + t, h + 0.1, d / 2 + t)),
+              mats.matte(value=(0.75, 0.99), saturation=(0, 0.4)),
+              shell=True)
+    fittings.add_some(stage, room, walls)
+    tops = _furnish(stage, walls, w, d, h)
     if daylight:
         _outside(stage, rng.uniform() < 0.6, walls[first])
     if not bright or rng.uniform() < 0.3:
         _light(stage, room, dark_side)
+    _small_lights(stage, tops, walls, w * d)
 
     def propose():
         low, high = stage.inside

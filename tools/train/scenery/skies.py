@@ -50,7 +50,8 @@ def daylight(rng, sun=True, azimuth=None):
         np.array([0.35, 0.5, 0.85]) * rng.uniform(0.3, 1) + rng.normal(0, 0.05, 3), np.array([0.85, 0.88, 0.92])
         + rng.normal(0, 0.08, 3), textures.color(rng, value=(0.15, 0.5), saturation=(0, 0.4))))
     t = np.clip(up, 0, 1)[..., None] ** rng.uniform(0.25, 0.7)
-    image = np.where(up[..., None] >= 0, np.maximum(horizon, 0.01) * (1 - t) + np.maximum(zenith, 0.01) * t, ground * 0.5)
+    image = np.where(up[..., None] >= 0, np.maximum(horizon, 0.01) * (1 - t) + np.maximum(zenith, 0.01) * t,
+                     ground * 0.5)
     elevation = math.radians(rng.uniform(8, 75 if azimuth is None else 50))
     azimuth = rng.uniform(0, 2 * math.pi) if azimuth is None else azimuth
     towards = np.array([math.cos(elevation) * math.cos(azimuth), math.sin(elevation),

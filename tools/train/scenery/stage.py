@@ -24,6 +24,8 @@ class ArrayScene(Scene):
         return self._push("accessors", accessor)
 
     def _geometry(self, shape, step):
+        if shape.flat and not shape.textured:
+            shape = shape.welded()
         attributes = {"POSITION": self._array(shape.points, "VEC3", bounds=True)}
         if not shape.flat:
             attributes["NORMAL"] = self._array(shape.normals, "VEC3")
@@ -107,10 +109,14 @@ class Stage:
             score = self._score(soup, eye, target, yfov)
             if score is not None:
                 views.append((score, eye, target, yfov))
-            if len(views) >= 3 * count:
+            if len(views) >= 4 * count:
                 break
-        views.sort(key=lambda view: -view[0])
-        chosen = views[:count]
+        chosen = []
+        while len(chosen) < count and views:
+            # Each next view is a good one that differs from those before it.
+            best = max(views, key=lambda view: view[0] + 4 * min([1.0, *(_difference(view, c) for c in chosen)]))
+            chosen.append(best)
+            views = [view for view in views if view is not best]
         return [{"look_at": ",".join(f"{x:.4f}" for x in (*eye, *target)), "yfov": yfov}
                 for _, eye, target, yfov in chosen]
 
@@ -136,6 +142,11 @@ class Stage:
         if counts.max() > 0.85 * len(rays):
             return None
         return len(np.flatnonzero(counts)) + self.rng.uniform(0, 3)
+
+
+def _difference(view, other):
+    """From 0, the same, to 1 and more: how far apart the eyes are against how far they look."""
+    return np.linalg.norm(view[1] - other[1]) / np.linalg.norm(view[1] - view[2])
 
 
 def _nearest(corners, numbers, eye, rays):

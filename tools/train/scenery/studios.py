@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from . import furniture, lamps, skies
-from .meshes import box, grid, merged, quad, rotate, scale, slab, sphere, translate
+from .meshes import box, grid, quad, rotate, scale, slab, sphere, translate
 
 
 def _backdrop(stage, size):
@@ -29,7 +29,8 @@ def _softbox(stage, size, flux):
     rng = stage.rng
     azimuth, elevation = rng.uniform(0, 360), rng.uniform(15, 80)
     w, h = np.exp(rng.uniform(np.log(0.03), np.log(0.9), 2)) * size
-    place = translate(0, 0.2, 0) @ rotate(1, azimuth) @ rotate(0, -elevation) @ translate(0, 0, size * rng.uniform(1.1, 1.8))
+    place = translate(0, 0.2, 0) @ rotate(1, azimuth) @ rotate(0, -elevation)
+    place = place @ translate(0, 0, size * rng.uniform(1.1, 1.8))
     front = quad((w / 2, -h / 2, 0), (-w, 0, 0), (0, h, 0)).moved(place)
     stage.emit(front, flux, lamps.lamp_color(rng, 0.25), solid=False)
     stage.add(box((-w / 2 - 0.01, -h / 2 - 0.01, 0.002), (w / 2 + 0.01, h / 2 + 0.01, 0.03)).moved(place),
@@ -86,7 +87,8 @@ def _plates(stage, size):
         stage.add(slab(rng.uniform(0.8, 1.8), 0.02, rng.uniform(0.2, 0.4)).moved(place), material)
     for _ in range(int(rng.integers(2, 6))):
         r = float(np.exp(rng.uniform(np.log(0.01), np.log(0.25))))
-        stage.emit(sphere(r, 24, 16).at(rng.uniform(-1, 1), rng.uniform(1.2, 2), rng.uniform(-1.5, 0.3)), rng.uniform(2, 9),
+        stage.emit(sphere(r, 24, 16).at(rng.uniform(-1, 1), rng.uniform(1.2, 2), rng.uniform(-1.5, 0.3)),
+                   rng.uniform(2, 9),
                    lamps.lamp_color(rng, 0.6))
     return [(0, 0.3, -0.3)]
 

@@ -206,6 +206,64 @@ def picture(rng):
     return np.clip(image + rng.uniform(0, 0.15) * (fractal(rng, 128, 20, 2) - 0.5)[..., None], 0, 1)
 
 
+def cells(rng):
+    """Cobbles, scales, cracked earth: the nearest of random points."""
+    n = int(rng.choice([12, 40, 150]))
+    points, tone = rng.uniform(size=(n, 2)), rng.uniform(size=n)
+    u, v = _coordinates(112)
+    d = np.abs(np.stack([u, v], -1)[:, :, None] - points)
+    d = np.minimum(d, 1 - d)
+    d = np.hypot(d[..., 0], d[..., 1])
+    nearest = np.argmin(d, axis=2)
+    two = np.partition(d, 1, axis=2)
+    a, b = _two(rng)
+    image = blend(a, b, tone[nearest] * rng.uniform(0.3, 1))
+    return np.where(((two[..., 1] - two[..., 0]) * math.sqrt(n) < rng.uniform(0, 0.25))[..., None], image * 0.4, image)
+
+
+def plaid(rng):
+    u, v = _coordinates(128)
+    image = np.ones((128, 128, 3)) * color(rng)
+    for _ in range(int(rng.integers(3, 8))):
+        c, at, width, axis = color(rng), rng.uniform(), rng.uniform(0.01, 0.2), rng.integers(2)
+        image = np.where((np.abs([u, v][axis] - at) < width / 2)[..., None], image * 0.4 + 0.6 * c, image)
+    return image
+
+
+def camouflage(rng):
+    """Sharp-edged patches of a few colours."""
+    t = fractal(rng, 160, int(rng.integers(2, 9)), 3)
+    palette = np.stack([color(rng) for _ in range(int(rng.integers(2, 6)))])
+    levels = np.quantile(t, np.linspace(0, 1, len(palette) + 1)[1:-1])
+    return palette[np.digitize(t, levels)]
+
+
+def hairlines(rng):
+    """Lines one texel wide on a plain ground: graph paper, cracks, scratches."""
+    a, b = _two(rng, 0.6)
+    t = np.zeros((160, 160))
+    if rng.uniform() < 0.5:
+        step = int(rng.choice([5, 8, 16, 32]))
+        t[::step] = 1
+        t[:, ::step] = 1
+    else:
+        for _ in range(int(rng.integers(5, 40))):
+            p, q = rng.uniform(0, 160, 2), rng.normal(0, 60, 2)
+            line = (p + np.linspace(0, 1, 240)[:, None] * q).astype(int) % 160
+            t[line[:, 0], line[:, 1]] = 1
+    return blend(a, b, t)
+
+
+def holes(rng):
+    """A sheet with holes, or threads with gaps: alpha cuts them out."""
+    u, v = _coordinates(96)
+    n = int(rng.choice([4, 6, 8, 12]))
+    x, y = u * n % 1 - 0.5, v * n % 1 - 0.5
+    solid = [np.hypot(x, y) > rng.uniform(0.25, 0.45), np.maximum(np.abs(x), np.abs(y)) > rng.uniform(0.25, 0.42),
+             np.abs(x) > rng.uniform(0.15, 0.35), fractal(rng, 96, 5, 2) > rng.uniform(0.42, 0.52)][rng.integers(4)]
+    return np.concatenate([np.ones((96, 96, 3)) * color(rng), solid[..., None]], axis=2)
+
+
 def leaf(rng):
     """A pointed leaf with veins; alpha cuts out its outline."""
     u, v = _coordinates(64)
@@ -225,7 +283,8 @@ def normals(height, strength):
     return 0.5 + 0.5 * n / np.linalg.norm(n, axis=-1, keepdims=True)
 
 
-PATTERNS = (mottled, speckle, checks, stripes, wood, marble, words, dots, weave, gradient)
+PATTERNS = (mottled, speckle, checks, stripes, wood, marble, words, dots, weave, gradient, cells, plaid, camouflage,
+            hairlines)
 
 
 def pattern(rng):
