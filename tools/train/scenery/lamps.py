@@ -76,7 +76,7 @@ def uplights(stage, room, flux):
         x, z = _spot(rng, room)
         y = rng.uniform(1.3, max(1.4, min(1.9, room[1][1] - 0.6)))
         r = rng.uniform(0.08, 0.22)
-        stage.add(lathe([(0.02, 0), (r * 0.8, 0.05), (r, 0.14)], 30).at(x, y, z), stage.materials.metal())
+        stage.add(lathe([(0.02, 0), (r * 0.8, 0.05), (r, 0.14)], 30).at(x, y, z), stage.materials.plain())
         stage.emit(lathe([(r * rng.uniform(0.1, 0.6), 0), (0, 0)], 20).at(x, y + 0.07, z), 1.5 * flux,
                    lamp_color(rng, 0.1))
         stage.add(rod((x, 0, z), (x, y + 0.02, z), 0.015), stage.materials.metal())
