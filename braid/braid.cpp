@@ -9,10 +9,10 @@ namespace braid {
 std::unique_ptr<Scene> load(const std::string& path, const LoadOptions& options, const SceneOptions& sceneOptions,
                             const LogSink& log) {
   auto scene = std::make_unique<Scene>(loadGltf(path, options, log), sceneOptions);
-  if (!options.defaultLight) return scene;
+  if (options.defaultLight == DefaultLight::None) return scene;
   const Settings usual;
   const std::optional<std::string> warning =
-      lightIfDark(*scene, scene->data().cameras.front(), usual.width, usual.height);
+      lightIfDark(*scene, scene->data().cameras.front(), usual.width, usual.height, 1, options.defaultLight);
   if (warning && log) log(LogLevel::Warning, path + ": " + *warning);
   return scene;
 }

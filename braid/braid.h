@@ -22,7 +22,7 @@
 namespace braid {
 
 // Reads a glTF file and builds everything that rays need. Warnings go to `log` and to scene->data().warnings.
-// Where the file's lights leave what its first camera sees dark, a grey dome is added (LoadOptions::defaultLight).
+// Where the file's lights leave what its first camera sees dark, light is added (LoadOptions::defaultLight).
 std::unique_ptr<Scene> load(const std::string& path, const LoadOptions& options = {},
                             const SceneOptions& sceneOptions = {}, const LogSink& log = {});
 

@@ -10,7 +10,8 @@ Camera::CameraRay cameraRayThrough(const Plan& plan, const SampleBlock& camera, 
   Vec2 offset(camera.u[slot::kPixelX] - 0.5f, camera.u[slot::kPixelY] - 0.5f);
   if (filter != PixelFilter::Box)
     offset = {sampleFilter(filter, camera.u[slot::kPixelX]), sampleFilter(filter, camera.u[slot::kPixelY])};
-  return plan.camera.ray(Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) + offset);
+  const Vec3 lens = plan.camera.lensPoint({camera.u[slot::kLensU], camera.u[slot::kLensV]});
+  return plan.camera.rayFrom(lens, Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) + offset);
 }
 
 bool recordFeatures(const Scene& scene, const SubpathVertex& vertex, int maxDepth, FeatureSample& features) {

@@ -285,6 +285,7 @@ bool PathKernel::shade(PathState& path, const Hit& hit, const SampleBlock& block
       return false;
     }
     if (material.emissive) addEmission(path, hit, sample);
+    sample.onGround = sample.onGround || (material.ground && path.fromCamera());
   }
   const uint32_t lobes = material.lobes;
   const Vec3 wo = hit.frame.toLocal(hit.wo);

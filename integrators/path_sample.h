@@ -8,8 +8,9 @@ namespace braid {
 // What one camera path returns.
 struct PathSample {
   Spectrum radiance{0};
-  Spectrum direct{0};  // the direct part of it
-  float coverage = 1;  // 0 when the camera ray misses everything
+  Spectrum direct{0};     // the direct part of it
+  float coverage = 1;     // 0 when the camera ray misses everything
+  bool onGround = false;  // of a shadow catcher: the radiance says how much of it is in shadow
   FeatureSample features;
 };
 

@@ -57,10 +57,17 @@ inline uint64_t pixelCount(const PixelWindow& w) {
   return static_cast<uint64_t>(w.width()) * static_cast<uint64_t>(w.height());
 }
 
+// What of the light that would reach an open ground does not reach this point of it: the alpha of black shadows.
+inline float shadowOf(const PassRequest& request, const PathSample& sample) {
+  return 1 - average(sample.radiance) / average(*request.context.scene.data().ground);
+}
+
 // Hands a path's result to the film: clamped only when asked to.
 inline void storeSample(const PassRequest& request, int x, int y, const PathSample& sample, PassTarget& target) {
   const Plan& plan = request.plan;
   Spectrum radiance = sample.radiance, direct = sample.direct;
+  const bool catches = sample.onGround && plan.settings.transparent;
+  if (catches) radiance = direct = Spectrum(0);
   if (plan.settings.clamp > 0) {
     const float largest = maxComponent(radiance);
     if (largest > plan.settings.clamp) {
@@ -73,7 +80,7 @@ inline void storeSample(const PassRequest& request, int x, int y, const PathSamp
     request.statistics->rejectedPixel = static_cast<int64_t>(y) * plan.settings.width + x;
   if (target.wantsDirect()) target.direct(px, py, direct);
   if (plan.kept.features) target.features(px, py, sample.features);
-  if (target.wantsCoverage()) target.coverage(px, py, sample.coverage);
+  if (target.wantsCoverage()) target.coverage(px, py, catches ? shadowOf(request, sample) : sample.coverage);
 }
 
 // A pass of one camera path for every pixel, followed by the path kernel with the integrator's random numbers and

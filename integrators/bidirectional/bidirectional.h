@@ -5,7 +5,7 @@
 //   s = 1           next-event estimation, with a light point of its own,
 //   s > 1, t > 1    a connection of two stored vertices,
 //   t = 1           a light vertex is connected to the camera and splatted.
-// t = 0 cannot happen with a pinhole or an orthographic camera, and lights are seen directly by s = 0 alone. Weights:
+// Light subpaths are not tested for hitting the lens (t = 0), and lights are seen directly by s = 0 alone. Weights:
 // power heuristic through the recursive quantities of renderer/transport/subpath.h, whose report's numbers appear
 // below.
 #pragma once

@@ -27,11 +27,15 @@ float hashToUnit(uint64_t key, uint32_t a, uint32_t b) {
 void BidirectionalKernel::connectToCamera(const SubpathVertex& vertex) {
   const Camera& camera = plan_.camera;
   const Vec3& position = vertex.hit.position;
-  const std::optional<Vec2> projected = camera.project(position);
+  const auto segments = static_cast<uint32_t>(vertex.segments);
+  // A point of the lens of its own; its density is that of camera rays, so that it leaves values and weights.
+  const Vec3 lens = camera.lensRadius() > 0
+                        ? camera.lensPoint({hashToUnit(vertex.key, segments, 13), hashToUnit(vertex.key, segments, 14)})
+                        : camera.position();
+  const std::optional<Vec2> projected = camera.projectFrom(lens, position);
   if (!projected) return;
   Vec2 raster = *projected;
   if (plan_.settings.filter != PixelFilter::Box) {
-    const auto segments = static_cast<uint32_t>(vertex.segments);
     raster += Vec2(sampleFilter(plan_.settings.filter, hashToUnit(vertex.key, segments, 11)),
                    sampleFilter(plan_.settings.filter, hashToUnit(vertex.key, segments, 12)));
   }
@@ -40,7 +44,7 @@ void BidirectionalKernel::connectToCamera(const SubpathVertex& vertex) {
   if (!(raster.x >= static_cast<float>(w.x0) && raster.x < static_cast<float>(w.x1) &&
         raster.y >= static_cast<float>(w.y0) && raster.y < static_cast<float>(w.y1)))
     return;
-  const Camera::CameraRay ray = camera.ray(*projected);
+  const Camera::CameraRay ray = camera.rayFrom(lens, *projected);
   const float distance =
       camera.orthographic() ? glm::dot(position - ray.origin, ray.direction) : glm::length(position - ray.origin);
   if (!(distance > 0)) return;

@@ -13,20 +13,34 @@ Camera::Camera(const CameraData& data, int width, int height)
   const float frameAspect = width_ / height_;
   halfHeight_ = orthographic_ ? data.ymag : std::tan(0.5f * data.yfov);
   halfWidth_ = halfHeight_ * frameAspect;
+  if (!orthographic_ && data.lensRadius > 0) {
+    lensRadius_ = data.lensRadius;
+    focusDistance_ = data.focusDistance;
+  }
 }
 
-Camera::CameraRay Camera::ray(Vec2 raster) const {
+Camera::CameraRay Camera::rayFrom(const Vec3& lensPoint, Vec2 raster) const {
   const float x = (2 * raster.x / width_ - 1) * halfWidth_;
   const float y = (1 - 2 * raster.y / height_) * halfHeight_;
   if (orthographic_) return {position_ + x * right_ + y * up_, forward_};
-  return {position_, glm::normalize(forward_ + x * right_ + y * up_)};
+  const Vec3 towards = forward_ + x * right_ + y * up_;
+  if (lensRadius_ <= 0) return {position_, glm::normalize(towards)};
+  return {lensPoint, glm::normalize(focusDistance_ * towards - (lensPoint - position_))};
 }
 
-std::optional<Vec2> Camera::project(const Vec3& point) const {
-  const Vec3 d = point - position_;
+Vec3 Camera::lensPoint(Vec2 u) const {
+  if (lensRadius_ <= 0) return position_;
+  const float r = lensRadius_ * std::sqrt(u.x), phi = 2 * kPi * u.y;
+  return position_ + r * std::cos(phi) * right_ + r * std::sin(phi) * up_;
+}
+
+std::optional<Vec2> Camera::projectFrom(const Vec3& lensPoint, const Vec3& point) const {
+  Vec3 d = point - lensPoint;
   const float depth = glm::dot(d, forward_);
   if (!(depth > 0)) return std::nullopt;
   const float scale = orthographic_ ? 1.0f : 1.0f / depth;
+  // Where the ray crosses the plane of focus, seen from the centre: similar triangles.
+  if (lensRadius_ > 0) d += (depth / focusDistance_) * (lensPoint - position_);
   const float x = glm::dot(d, right_) * scale / halfWidth_;
   const float y = glm::dot(d, up_) * scale / halfHeight_;
   return Vec2(0.5f * (x + 1) * width_, 0.5f * (1 - y) * height_);

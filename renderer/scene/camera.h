@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Perspective (pinhole) and orthographic cameras: rays, importance, and the projection of a point onto the raster.
+// Perspective (pinhole or thin lens) and orthographic cameras: rays, importance, and the projection of a point onto the
+// raster.
 #pragma once
 
 #include <optional>
@@ -19,16 +20,25 @@ class Camera {
   struct CameraRay {
     Vec3 origin, direction;  // direction is unit
   };
-  // Ray through the raster position (pixel centres at +0.5).
-  CameraRay ray(Vec2 raster) const;
+  // Ray through the raster position (pixel centres at +0.5): of a pinhole, or through the centre of the lens.
+  CameraRay ray(Vec2 raster) const { return rayFrom(position_, raster); }
+  // The same from a point of the lens, toward the point of the plane of focus that the centre sees there.
+  CameraRay rayFrom(const Vec3& lensPoint, Vec2 raster) const;
+  // A point of the lens, uniform on its disk for uniform u; of a pinhole the one that there is.
+  Vec3 lensPoint(Vec2 u) const;
 
-  // The raster position of a world point, or none behind the camera. Does not test against the frame.
-  std::optional<Vec2> project(const Vec3& point) const;
+  // The raster position at which the centre, or a point of the lens, sees a world point, or none behind the camera.
+  // Does not test against the frame.
+  std::optional<Vec2> project(const Vec3& point) const { return projectFrom(position_, point); }
+  std::optional<Vec2> projectFrom(const Vec3& lensPoint, const Vec3& point) const;
 
   // Density with which rays through one pixel, uniform on it, take the direction of the unit vector d: per steradian
-  // (perspective), or per m² on the sensor (orthographic). 0 behind the camera.
+  // (perspective), or per m² on the sensor (orthographic). 0 behind the camera. The same from every point of the lens,
+  // as all see the same frame on the plane of focus.
   double pixelPdf(const Vec3& d) const;
 
+  float lensRadius() const { return lensRadius_; }  // metres; 0: pinhole
+  float focusDistance() const { return focusDistance_; }
   bool orthographic() const { return orthographic_; }
   Vec3 position() const { return position_; }
   Vec3 forward() const { return forward_; }
@@ -42,6 +52,7 @@ class Camera {
   Vec3 position_{0}, right_{1, 0, 0}, up_{0, 1, 0}, forward_{0, 0, -1};
   float halfWidth_ = 1, halfHeight_ = 1;  // of the frame at distance 1, or of the sensor
   float width_ = 1, height_ = 1;
+  float lensRadius_ = 0, focusDistance_ = 1;
   bool orthographic_ = false;
 };
 

@@ -10,6 +10,7 @@
 #include "renderer/core/stopwatch.h"
 #include "renderer/scene/closed_mesh.h"
 #include "renderer/scene/data/placement.h"
+#include "renderer/scene/data/scene_defaults.h"
 
 namespace braid {
 
@@ -39,12 +40,11 @@ Scene::Scene(SceneData data, const SceneOptions& options) : data_(std::move(data
   times_.hierarchy = building.seconds();
 }
 
-void Scene::addDefaultLight(const Spectrum& radiance, const std::string& warning) {
-  data_.environment = EnvironmentData{nullptr, radiance, 0};
-  data_.defaultLight = true;
+void Scene::addDefaultLight(DefaultLight kind, float scale, const std::string& warning) {
+  giveDefaultLight(data_, kind, scale);
   data_.warnings.push_back(warning);
   environment_.emplace(*data_.environment);
-  traits_.flags |= kTraitEnvironment;
+  traits_.flags |= environment_->constant() ? kTraitEnvironment : kTraitEnvironment | kTraitEnvironmentImage;
 }
 
 // A mesh that one of several placements flattens cannot be an instance there, because rays could not be brought into

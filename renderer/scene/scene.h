@@ -34,9 +34,9 @@ class Scene : private HitFilter {
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
 
-  // Lights a dark scene by a constant environment, which is marked as the default light, and keeps the warning that
-  // says so. Before anything is planned or rendered.
-  void addDefaultLight(const Spectrum& radiance, const std::string& warning);
+  // Lights a dark scene by giveDefaultLight(), and keeps the warning that says so. Before anything is planned or
+  // rendered.
+  void addDefaultLight(DefaultLight kind, float scale, const std::string& warning);
 
   const SceneData& data() const { return data_; }
   const std::vector<TriangleMesh>& meshes() const { return data_.meshes; }

@@ -14,6 +14,8 @@ namespace braid {
 namespace {
 
 constexpr double kLeastLit = 0.01;
+// Of what shines by itself: labels and lamps on a thing do not show the thing.
+constexpr double kLeastShining = 0.25;
 
 // What counts as full light.
 double referenceRadiance(const Scene& scene, double dome) {
@@ -24,21 +26,29 @@ double referenceRadiance(const Scene& scene, double dome) {
   return brightest > 0 ? std::min(dome, brightest) : dome;
 }
 
-// The share of what the camera sees that the scene's lights light; none where nothing seen needs light.
-std::optional<double> litShare(const Scene& scene, const Camera& camera, int width, int height, double dome) {
+// What the scene's lights do for what the camera sees.
+struct Lit {
+  double received = 0;  // the share that their light meets
+  bool enough = false;
+};
+
+// None where nothing seen needs light.
+std::optional<Lit> measureLit(const Scene& scene, const Camera& camera, int width, int height, double dome) {
   const TransportContext context(scene);
   const double reference = referenceRadiance(scene, dome);
   const LitShare direct = measureLitShare(context, camera, width, height, reference);
   if (!(direct.seen > 0)) return {};
-  if (direct.share >= kLeastLit) return direct.share;
+  if (direct.received >= kLeastLit || direct.share >= kLeastShining) return Lit{direct.received, true};
   // What camera paths do not find at once: light from other surfaces and through glass.
   const double scattered = measureLightReach(context, camera, width, height).scatteredRadiance;
-  return std::min(1.0, direct.share + scattered / reference);
+  const double received = std::min(1.0, direct.received + scattered / reference);
+  return Lit{received, received >= kLeastLit};
 }
 
 }  // namespace
 
-std::optional<std::string> lightIfDark(Scene& scene, const CameraData& data, int width, int height, float scale) {
+std::optional<std::string> lightIfDark(Scene& scene, const CameraData& data, int width, int height, float scale,
+                                       DefaultLight kind) {
   const double dome = static_cast<double>(kDefaultDome * scale);
   const bool hasDome = scene.data().defaultLight;
   if (!(dome > 0) || (scene.environment() && !hasDome)) return {};
@@ -46,18 +56,16 @@ std::optional<std::string> lightIfDark(Scene& scene, const CameraData& data, int
   std::string text;
   if (!hasDome) {
     if (!scene.traits().has(kTraitEmissiveTriangles | kTraitPointLights | kTraitDirectionalLights)) return {};
-    const std::optional<double> own = litShare(scene, camera, width, height, dome);
-    if (!own || *own >= kLeastLit) return {};
-    text = fmt::format(
-        "the lights of the file light {:.2g} % of what the camera sees; a grey dome of radiance {:.2g} is "
-        "added (--no-default-light: none)",
-        100 * *own, dome);
-    scene.addDefaultLight(Spectrum(kDefaultDome * scale), text);
+    const std::optional<Lit> own = measureLit(scene, camera, width, height, dome);
+    if (!own || own->enough) return {};
+    text = fmt::format("the lights of the file light {:.2g} % of what the camera sees; {}", 100 * own->received,
+                       describeDefaultLight(kind));
+    scene.addDefaultLight(kind, scale, text);
   }
-  const std::optional<double> lit = litShare(scene, camera, width, height, dome);
-  if (!lit || *lit >= kLeastLit) return text.empty() ? std::nullopt : std::optional(text);
+  const std::optional<Lit> lit = measureLit(scene, camera, width, height, dome);
+  if (!lit || lit->enough) return text.empty() ? std::nullopt : std::optional(text);
   text = fmt::format(
-      "{}{}the grey dome does not reach what the camera sees: the picture stays dark (--camera, --look-at: "
+      "{}{}this light does not reach what the camera sees: the picture stays dark (--camera, --look-at: "
       "look from elsewhere)",
       text, text.empty() ? "" : "; ");
   return text;

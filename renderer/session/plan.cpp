@@ -122,6 +122,35 @@ void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
                             : fmt::format("{} finite lights: chosen by power", finite)});
 }
 
+// Alpha of shadows follows from the light that camera paths find: what light paths bring has no alpha.
+void planGround(const Scene& scene, Plan& plan) {
+  Settings& s = plan.settings;
+  if (!scene.data().ground || !s.transparent) return;
+  if (isBlack(*scene.data().ground))
+    throw Error(
+        ExitCode::Usage,
+        "--ground --transparent: only lamps light the ground, which cannot tell shadow from distance: give --env");
+  for (std::string& name : s.integrators) {
+    if (name == "auto") name = "pt";
+    if (name != "pt" && name != "crn")
+      throw Error(ExitCode::Usage, "--ground --transparent: " + name + " has no alpha of shadows: use --integrator pt");
+  }
+}
+
+// What the view has that the file has not, and the lens.
+void planView(const Scene& scene, Plan& plan) {
+  const SceneData& data = scene.data();
+  if (data.defaultLight)
+    plan.lines.push_back({true, data.backdrop ? "studio" : "grey dome",
+                          "made up, as the file's own light shows next to nothing (--default-light)"});
+  if (data.ground) plan.lines.push_back({true, "ground", "under the scene, of the colour of the backdrop (--ground)"});
+  if (data.defaultCamera) plan.lines.push_back({true, "camera", "made up, as the file has none (--look-at)"});
+  if (const Camera& camera = plan.camera; camera.lensRadius() > 0)
+    plan.lines.push_back(
+        {true, "lens",
+         fmt::format("{:.4g} m wide, sharp at {:.4g} m", 2 * camera.lensRadius(), camera.focusDistance())});
+}
+
 // What the film keeps, and what a pixel of it takes.
 void planBuffers(Plan& plan) {
   const Settings& settings = plan.settings;
@@ -195,14 +224,17 @@ Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& sett
               const std::vector<const Integrator*>& available) {
   Plan plan;
   plan.settings = settings;
+  if (!plan.settings.background) plan.settings.background = scene.data().backdrop;
   plan.camera = Camera(camera, settings.width, settings.height);
   plan.window = settings.crop.value_or(PixelWindow{0, 0, settings.width, settings.height});
   const PixelWindow& w = plan.window;
   if (w.x0 < 0 || w.y0 < 0 || w.x1 > settings.width || w.y1 > settings.height || w.width() <= 0 || w.height() <= 0)
     throw Error(ExitCode::Usage, fmt::format("the crop {},{},{},{} is empty or outside the {}x{} frame", w.x0, w.y0,
                                              w.x1, w.y1, settings.width, settings.height));
-  planIntegrators(scene, settings, available, plan);
+  planGround(scene, plan);
+  planIntegrators(scene, plan.settings, available, plan);
   planSceneParts(scene, settings, plan);
+  planView(scene, plan);
   plan.filmLine = plan.lines.size();
   planFilm(plan);
   return plan;

@@ -16,12 +16,13 @@ struct RecordedRay : RayQuery {
   bool shadow = false;
 };
 
-// What shading asks of every material, in eight bytes: materials themselves are large.
+// What shading asks of every material, in a few bytes: materials themselves are large.
 struct MaterialSummary {
   uint32_t lobes = 0;  // LobeFlags
   bool emissive = false, unlit = false, volume = false;
   bool pane = false;  // Material::mayBePane()
-  bool special() const { return emissive || unlit || volume; }
+  bool ground = false;
+  bool special() const { return emissive || unlit || volume || ground; }
 };
 
 struct TransportContext {
@@ -32,7 +33,7 @@ struct TransportContext {
   explicit TransportContext(const Scene& s, LightStrategy strategy = LightStrategy::Automatic)
       : scene(s), lights(s, strategy) {
     for (const Material& m : s.materials())
-      materials.push_back({materialLobes(m), m.emissive(), m.unlit, m.hasVolume(), m.mayBePane()});
+      materials.push_back({materialLobes(m), m.emissive(), m.unlit, m.hasVolume(), m.mayBePane(), m.isGround});
   }
   const MaterialSummary& summaryOf(const Hit& hit) const { return materials[hit.mesh->material]; }
 };

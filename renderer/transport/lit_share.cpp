@@ -38,7 +38,7 @@ class Glance {
     const auto i = static_cast<size_t>(index);
     met_ = true;
     if (vertex.hit.material->unlit) return Onward::End;
-    level_[i] += emittedTowards(context_.scene, vertex.hit);
+    emitted_[i] += emittedTowards(context_.scene, vertex.hit);
     if (!vertex.bsdf.hasNonDelta()) return Onward::Scatter;
     weight_[i] = average(vertex.throughput);
     sampleLight(i, vertex);
@@ -55,13 +55,14 @@ class Glance {
       if (rays_.hidden(k)) continue;
       Spectrum arriving(arriving_[static_cast<size_t>(k)]);
       rays_.attenuate(k, arriving);
-      level_[owner_[static_cast<size_t>(k)]] += average(arriving);
+      received_[owner_[static_cast<size_t>(k)]] += average(arriving);
     }
     for (size_t i = 0; i < weight_.size(); ++i) {
       const double weight = static_cast<double>(weight_[i]);
       if (!(weight > 0) || !std::isfinite(weight)) continue;
       sum.seen += weight;
-      sum.share += weight * std::min(1.0, static_cast<double>(level_[i]) / reference);
+      sum.share += weight * std::min(1.0, static_cast<double>(emitted_[i] + received_[i]) / reference);
+      sum.received += weight * std::min(1.0, static_cast<double>(received_[i]) / reference);
     }
     sum.seesSurfaces = sum.seesSurfaces || met_;
   }
@@ -90,7 +91,7 @@ class Glance {
 
   const TransportContext& context_;
   const PassSampler& sampler_;
-  std::array<float, kBatch> weight_{}, level_{}, arriving_{};
+  std::array<float, kBatch> weight_{}, emitted_{}, received_{}, arriving_{};
   std::array<size_t, kBatch> owner_{};
   VisibilityBatch rays_;
   int shadows_ = 0;
@@ -119,9 +120,12 @@ LitShare measureLitShare(const TransportContext& context, const Camera& camera, 
     batch.run([&](int index, const SubpathState&, const SubpathVertex& v) { return glance.onHit(index, v); },
               [&](int index, const SubpathState& state) { glance.onMiss(index, state); });
     glance.addTo(lit, reference);
-    if (lit.seen > kEnoughSeen && lit.share > kEnoughLit * lit.seen) break;
+    if (lit.seen > kEnoughSeen && lit.received > kEnoughLit * lit.seen) break;
   }
-  if (lit.seen > 0) lit.share /= lit.seen;
+  if (lit.seen > 0) {
+    lit.share /= lit.seen;
+    lit.received /= lit.seen;
+  }
   return lit;
 }
 

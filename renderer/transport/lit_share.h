@@ -13,6 +13,7 @@ struct LitShare {
   // Of these, the share that emits or is met by direct light. A point counts in full from `reference` on, by the
   // radiance it emits and the radiance of a white diffuse surface there, and in proportion below it.
   double share = 0;
+  double received = 0;  // the same by the light that meets them alone
 };
 
 // A pure function of the scene, the camera and the frame, with a radiance `reference` > 0 in W/(m² sr). Mirrors and

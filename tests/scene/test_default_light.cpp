@@ -54,7 +54,7 @@ struct Outcome {
 Outcome outcomeOf(SceneData data, float scale = 1) {
   const CameraData camera = data.cameras.at(0);
   Scene scene(std::move(data));
-  const std::optional<std::string> text = lightIfDark(scene, camera, kWidth, kHeight, scale);
+  const std::optional<std::string> text = lightIfDark(scene, camera, kWidth, kHeight, scale, DefaultLight::Dome);
   CHECK(scene.environment().has_value() == scene.traits().has(kTraitEnvironment));
   if (scene.data().defaultLight) CHECK(scene.environment()->average() == Spectrum(0.5f * scale));
   return {scene.data().defaultLight, text.value_or("")};
@@ -253,7 +253,7 @@ TEST_CASE("Default light: every command decides alike, for the camera that was c
                         {{"name", "lit"}, {"camera", 0}, {"translation", {50.5, 0.5, 2}}}};
   file.root["scenes"][0]["nodes"] = {0, 1, 2, 3, 4};
   folder.write("scene.glb", file.glb());
-  const std::string options = " --size 32x18 --spp 4 --integrator pt --combine none ";
+  const std::string options = " --size 32x18 --spp 4 --integrator pt --combine none --default-light dome ";
   const auto plan = [&](const std::string& camera, const std::string& more = "") {
     const Run run = braidRun(folder, "plan scene.glb --json" + options + "--camera " + camera + more);
     CHECK(run.code == 0);
@@ -263,16 +263,18 @@ TEST_CASE("Default light: every command decides alike, for the camera that was c
   CHECK(plan("dark"));
   CHECK_FALSE(plan("lit"));
   CHECK_FALSE(plan("dark", " --no-default-light"));
-  CHECK(contains(braidRun(folder, "info scene.glb --json --camera dark").out, "grey dome"));
-  CHECK_FALSE(contains(braidRun(folder, "info scene.glb --json --camera lit").out, "grey dome"));
-  CHECK(contains(braidRun(folder, "replay scene.glb --pass 0 --pixel 16,9 --size 32x18").err, "grey dome"));
+  CHECK(contains(braidRun(folder, "info scene.glb --json --default-light dome --camera dark").out, "grey dome"));
+  CHECK_FALSE(contains(braidRun(folder, "info scene.glb --json --default-light dome --camera lit").out, "grey dome"));
+  CHECK(contains(braidRun(folder, "replay scene.glb --pass 0 --pixel 16,9 --size 32x18 --default-light dome").err,
+                 "grey dome"));
 
   const Run whole = braidRun(folder, "render scene.glb -o whole.exr --reproducible" + options);
   CHECK(contains(whole.err, "warning: scene.glb: the lights of the file light 0 % of what the camera sees"));
   for (const char* part : {"0:2", "2:4"}) {
     const std::string name = part[0] == '0' ? "a" : "b";
-    CHECK(braidRun(folder, "render scene.glb -q --size 32x18 --integrator pt --combine none --passes " +
-                               std::string(part) + " --checkpoint " + name + ".state")
+    CHECK(braidRun(folder,
+                   "render scene.glb -q --size 32x18 --integrator pt --combine none --default-light dome --passes " +
+                       std::string(part) + " --checkpoint " + name + ".state")
               .code == 0);
   }
   CHECK(braidRun(folder, "merge a.state b.state -o merged.exr").code == 0);

@@ -100,7 +100,7 @@ class GltfFile {
     return glbOf(text + (binary.empty() ? "" : chunk(kBinaryChunk, binary, '\0')));
   }
 
-  SceneData load(const LoadOptions& options = {}) const {
+  SceneData load(const LoadOptions& options = {.defaultLight = DefaultLight::Dome}) const {
     const Folder folder;
     return loadGltf(folder.write("scene.glb", glb()), options);
   }

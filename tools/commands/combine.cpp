@@ -33,7 +33,7 @@ struct CombineOptions {
   AovSet aovs = AovSet::All;
   CombineChoice choice;
   uint64_t samplesPerPixel = 0;
-  double exposure = 0;
+  ToneChoice tone;
   int threads = 0;
   bool quarters = false, floatHeadline = false, noTiming = false, quiet = false;
 };
@@ -212,9 +212,11 @@ std::string writeResult(const CombineOptions& o, const PipelineResult& result, I
   exr.floatHeadline = o.floatHeadline;
   exr.layers = combined.layers();
   const Plane<float>* alpha = in.alpha.empty() ? nullptr : &in.alpha;
-  const std::string clamped = writeImageFile(o.output, all, *combined.headline(), alpha, exr, o.exposure);
-  if (!o.png.empty())
-    writePicture(o.png, ImageFormat::Png, *combined.headline(), alpha, static_cast<float>(o.exposure));
+  const Rgb<float>& image = *combined.headline();
+  const std::optional<Tone> tone = toneOf(o.output, o.png, o.tone, image, alpha);
+  const std::string clamped = writeImageFile(o.output, all, image, alpha, exr, tone.value_or(Tone()));
+  if (!o.png.empty()) writePicture(o.png, ImageFormat::Png, image, alpha, *tone);
+  if (tone && !o.quiet) fmt::print(stderr, "{}\n", describe(*tone));
   return clamped;
 }
 
@@ -274,9 +276,7 @@ void addInputOptions(CLI::App& command, CombineOptions& o) {
 void addOutputOptions(CLI::App& command, CombineOptions& o) {
   addOutput(command, o.output)->required();
   command.add_option("--png", o.png, "Also write a tone-mapped PNG")->type_name("FILE");
-  command.add_option("--exposure", o.exposure, "Exposure of PNG and JPEG in stops")
-      ->capture_default_str()
-      ->check(number(-64, 64));
+  addToneOptions(command, o.tone);
   addWords(command, "--aovs", o.aovs, parseAovs, "Layers besides the image: none, features or all")
       ->default_str("all")
       ->type_name("SET");
@@ -285,7 +285,7 @@ void addOutputOptions(CLI::App& command, CombineOptions& o) {
   command.add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
   addThreads(command, o.threads);
   command.add_flag("-q,--quiet", o.quiet, "Errors only");
-  showFirst(command, kOutputHelp, {"--output", "--png", "--exposure", "--aovs", "--threads", "--quiet"});
+  showFirst(command, kOutputHelp, {"--output", "--png", "--tone", "--exposure", "--aovs", "--threads", "--quiet"});
 }
 
 constexpr const char* kCombineHints =

@@ -55,7 +55,10 @@ nlohmann::json describe(const Scene& scene) {
            {{"min", empty ? nlohmann::json() : inFile(scene.bounds().lo, data.origin)},
             {"max", empty ? nlohmann::json() : inFile(scene.bounds().hi, data.origin)}}},
           {"cameras", data.defaultCamera ? nlohmann::json::array() : cameras},
+          {"defaultCamera", data.defaultCamera},
           {"lights", lights},
+          {"defaultLight",
+           !data.defaultLight ? nlohmann::json(nullptr) : nlohmann::json(data.backdrop ? "studio" : "dome")},
           {"animations", animations},
           {"emitters", emitters.size()},
           {"emissiveTriangles", t.emissiveTriangles},
@@ -82,7 +85,9 @@ void print(const nlohmann::json& j) {
   fmt::print("  triangles   {} ({} instanced) in {} meshes, {} instances\n", j["triangles"].dump(),
              j["instancedTriangles"].dump(), j["meshes"].dump(), j["instances"].dump());
   fmt::print("  bounds      {} to {} metres\n", j["bounds"]["min"].dump(), j["bounds"]["max"].dump());
-  fmt::print("  cameras     {}\n  lights      {}\n", list(j["cameras"]), list(j["lights"]));
+  fmt::print("  cameras     {}{}\n", list(j["cameras"]), j["defaultCamera"].get<bool>() ? " (one is made up)" : "");
+  fmt::print("  lights      {}{}\n", list(j["lights"]),
+             j["defaultLight"].is_null() ? "" : fmt::format(" ({} is added)", j["defaultLight"].get<std::string>()));
   fmt::print("  emitters    {} materials, {} triangles\n", j["emitters"].dump(), j["emissiveTriangles"].dump());
   fmt::print("  materials   {}, textures {}\n", j["materials"].dump(), j["textures"].dump());
   fmt::print("  traits      {}\n  extensions  {}\n", list(j["traits"]), list(j["extensionsUsed"]));

@@ -114,6 +114,7 @@ void sayResult(const MergeOptions& o, const WrittenImage& written, const std::ve
                uint64_t samples) {
   for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
   for (const std::string& text : written.timings) fmt::print(stderr, "{}\n", text);
+  if (written.tone) fmt::print(stderr, "{}\n", describe(*written.tone));
   for (const std::string& file : filesOf(o)) fmt::print(stderr, "Saved: {}\n", file);
   std::string intervals;
   for (const PassInterval& i : passes)

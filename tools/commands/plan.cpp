@@ -75,7 +75,7 @@ FarmJob farmJob(const PlanOptions& o, const Settings& planned) {
   job.threads = o.samples.threads;
   carry(o.renderOptions, {"spp", "threads"}, job.render);
   carry(o.imageOptions,
-        {"output", "png", "exposure", "aovs", "quarters", "history", "direct-indirect", "float", "layer-prefix",
+        {"output", "png", "tone", "exposure", "aovs", "quarters", "history", "direct-indirect", "float", "layer-prefix",
          "weights", "reproducible"},
         job.render);
   if (o.transparent) job.render.push_back({"--transparent", std::nullopt});

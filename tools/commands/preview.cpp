@@ -56,7 +56,7 @@ class Audience {
   Audience(const PreviewOptions& o, std::atomic<bool>& stop)
       : quiet_(o.scene.quiet),
         title_(std::filesystem::path(o.scene.file).filename().string()),
-        board_(title_, o.image.files(), o.image.exposure) {
+        board_(title_, o.image.files(), o.image.tone) {
     if (o.tev) tev_.emplace(*o.tev);
     if (o.port < 0 && tev_) return;
     serve(o.port, [&stop] { stop = true; });
@@ -113,6 +113,7 @@ void saySaved(const PreviewOptions& o, const RunReport& result, const WrittenIma
               const std::string& reason) {
   if (o.scene.quiet) return;
   for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
+  if (written.tone) fmt::print(stderr, "{}\n", describe(*written.tone));
   for (const std::string& file : o.image.files()) fmt::print(stderr, "Saved: {}\n", file);
   fmt::print(stderr, "{} spp in {}, {}stopped by {}\n", result.spp, formatSeconds(result.seconds),
              written.error ? fmt::format("estimated error {:.3g}, ", *written.error) : "", reason);

@@ -46,6 +46,7 @@ nlohmann::json resultRecord(const FinishedRender& render, const RenderOptions& o
           {"reason", toString(r.reason)},
           {"spp", r.spp},
           {"estimatedError", errorOrNull(render.written.error)},
+          {"exposure", render.written.tone ? nlohmann::json(render.written.tone->exposureStops) : nullptr},
           {"seconds",
            {{"start", times.start},
             {"load", times.load},
@@ -68,6 +69,7 @@ void sayResult(const FinishedRender& render, const RenderOptions& o) {
   if (r.rejected > 0) fmt::print(stderr, "warning: {} non-finite or negative samples counted as 0\n", r.rejected);
   if (r.firstRejected) fmt::print(stderr, "one of them: {}\n", describe(*r.firstRejected, o));
   for (const std::string& text : written.timings) fmt::print(stderr, "{}\n", text);
+  if (written.tone) fmt::print(stderr, "{}\n", describe(*written.tone));
   std::string outputs;
   for (const std::string& file : o.files()) {
     fmt::print(stderr, "Saved: {}\n", file);

@@ -58,6 +58,13 @@ std::vector<Attribute> planAttributes(const Scene& scene, const Plan& plan, cons
       matrix("worldToCamera", plan.camera.worldToCamera(scene.data().origin)),
       matrix("worldToNDC", plan.camera.worldToNdc(scene.data().origin)),
   };
+  const SceneData& data = scene.data();
+  if (data.defaultLight) list.push_back(textAttribute("braid/defaultLight", data.backdrop ? "studio" : "dome"));
+  if (data.defaultCamera) list.push_back(textAttribute("braid/defaultCamera", "framed"));
+  if (plan.camera.lensRadius() > 0) {
+    list.push_back(numberAttribute("braid/lensDiameter", 2 * static_cast<double>(plan.camera.lensRadius())));
+    list.push_back(numberAttribute("focus", static_cast<double>(plan.camera.focusDistance())));
+  }
   if (s.clamp > 0) list.push_back(numberAttribute("braid/clamp", static_cast<double>(s.clamp)));
   if (!plan.unreachable.empty()) list.push_back(textAttribute(kUnreachableAttribute, plan.unreachable));
   return list;

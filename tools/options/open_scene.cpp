@@ -1,17 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/options/open_scene.h"
 
+#include <cmath>
 #include <cstdio>
 
 #include <fmt/format.h>
 
 #include "renderer/core/error.h"
 #include "renderer/core/stopwatch.h"
+#include "renderer/scene/camera.h"
+#include "renderer/scene/data/ground.h"
+#include "renderer/scene/data/scene_defaults.h"
 #include "renderer/session/default_light.h"
 
 namespace braid {
 
 namespace {
+
+// Of the film or sensor that f-numbers are meant for: 36 x 24 mm.
+constexpr double kFrameHeight = 0.024;
 
 // The camera of the file that the choice names.
 const CameraData& namedCamera(const SceneData& data, const SceneChoice& c) {
@@ -25,7 +32,39 @@ const CameraData& namedCamera(const SceneData& data, const SceneChoice& c) {
               fmt::format("no camera '{}' in {}: it has {}", c.camera, c.file, known.empty() ? "none" : known));
 }
 
+// How far along the view the first surface in the middle of a pixel lies.
+double depthAt(const Scene& scene, const CameraData& data, const SceneChoice& c, const std::pair<int, int>& pixel) {
+  const auto& [x, y] = pixel;
+  const Camera camera(data, c.size.width, c.size.height);
+  const Camera::CameraRay ray = camera.ray({static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f});
+  RayBatch rays;
+  RayHit hit;
+  rays.set(0, {ray.origin, ray.direction, kInfinity, kCameraRay});
+  scene.accel().intersect(rays, 1, &hit);
+  if (!(hit.t < kInfinity))
+    throw Error(ExitCode::Usage, fmt::format("--focus: pixel {},{} of {} sees nothing: give metres, or another pixel",
+                                             x, y, toString(c.size)));
+  return static_cast<double>(hit.t * glm::dot(ray.direction, camera.forward()));
+}
+
 }  // namespace
+
+void fitLens(const Scene& scene, const SceneChoice& c, CameraData& camera) {
+  if (!c.aperture) {
+    if (c.focus) throw Error(ExitCode::Usage, "--focus: everything is sharp without --aperture: give it");
+    return;
+  }
+  if (camera.orthographic)
+    throw Error(ExitCode::Usage,
+                "--aperture: an orthographic camera has no lens: choose another (--camera, --look-at)");
+  const std::pair<int, int> middle(c.size.width / 2, c.size.height / 2);
+  const bool byDistance = c.focus && !c.focus->pixel;
+  camera.focusDistance =
+      static_cast<float>(byDistance ? c.focus->metres : depthAt(scene, camera, c, c.focus ? *c.focus->pixel : middle));
+  const double focalLength = 0.5 * kFrameHeight / std::tan(0.5 * static_cast<double>(camera.yfov));
+  const double width = c.aperture->fNumber > 0 ? focalLength / c.aperture->fNumber : c.aperture->metres;
+  camera.lensRadius = static_cast<float>(0.5 * width);
+}
 
 OpenedScene openScene(const SceneChoice& choice) {
   const Stopwatch clock;
@@ -33,13 +72,15 @@ OpenedScene openScene(const SceneChoice& choice) {
   OpenedScene opened;
   opened.loadSeconds = clock.seconds();
   opened.camera = chooseCamera(data, choice);
+  if (choice.ground) addGround(data);
   opened.scene = buildScene(std::move(data), choice, opened.camera);
+  fitLens(*opened.scene, choice, opened.camera);
   return opened;
 }
 
 SceneData loadScene(const SceneChoice& c) {
   LoadOptions options = c.load;
-  options.defaultLight = !c.noDefaultLight && c.environment.empty();
+  options.defaultLight = c.environment.empty() ? c.defaultLight : DefaultLight::None;
   options.keepAllAttributes = c.full;
   options.camera = c.lookAt ? "none" : c.camera;
   if (c.frameScene >= 0) options.scene = c.frameScene;
@@ -57,6 +98,7 @@ SceneData loadScene(const SceneChoice& c) {
     data.environment = e;
   } else if (data.environment) {
     data.environment->radiance *= scale;
+    if (data.backdrop) *data.backdrop *= scale;
   }
   for (Material& m : data.materials) m.emission *= scale;
   for (PunctualLight& l : data.lights) l.intensity *= scale;
@@ -68,9 +110,9 @@ std::unique_ptr<Scene> buildScene(SceneData data, const SceneChoice& c, const Ca
   options.isa = c.isa == "auto" ? "" : c.isa;
   options.full = c.full;
   auto scene = std::make_unique<Scene>(std::move(data), options);
-  if (c.noDefaultLight || !c.environment.empty()) return scene;
+  if (c.defaultLight == DefaultLight::None || !c.environment.empty()) return scene;
   const std::optional<std::string> warning =
-      lightIfDark(*scene, camera, c.size.width, c.size.height, static_cast<float>(c.lightScale));
+      lightIfDark(*scene, camera, c.size.width, c.size.height, static_cast<float>(c.lightScale), c.defaultLight);
   if (warning && !c.quiet) fmt::print(stderr, "warning: {}: {}\n", c.file, *warning);
   return scene;
 }
@@ -78,6 +120,9 @@ std::unique_ptr<Scene> buildScene(SceneData data, const SceneChoice& c, const Ca
 CameraData chooseCamera(const SceneData& data, const SceneChoice& c) {
   CameraData camera;
   if (!data.cameras.empty()) camera = data.cameras[0];
+  if (data.defaultCamera && !c.lookAt)
+    camera = framingCamera(data, static_cast<float>(c.size.width) / static_cast<float>(c.size.height),
+                           c.yfovDegrees > 0 ? glm::radians(static_cast<float>(c.yfovDegrees)) : kDefaultYfov);
   if (!c.camera.empty()) camera = namedCamera(data, c);
   if (c.lookAt) {
     const Vec3 eye(c.lookAt->eye - data.origin), target(c.lookAt->target - data.origin);

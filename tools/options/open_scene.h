@@ -22,6 +22,8 @@ OpenedScene openScene(const SceneChoice& choice);
 SceneData loadScene(const SceneChoice& choice);
 // The camera that the choice names. Throws Error(Usage) listing the cameras when there is none of that name.
 CameraData chooseCamera(const SceneData& data, const SceneChoice& choice);
+// Gives the camera the lens that the choice has, focused in the scene. Throws Error(Usage).
+void fitLens(const Scene& scene, const SceneChoice& choice, CameraData& camera);
 // Builds what rays need, and adds the default light where the camera would see next to nothing.
 std::unique_ptr<Scene> buildScene(SceneData data, const SceneChoice& choice, const CameraData& camera);
 

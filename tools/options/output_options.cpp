@@ -11,8 +11,19 @@
 
 #include "renderer/core/error.h"
 #include "renderer/film/files/output_file.h"
+#include "tools/options/syntax/option_checks.h"
+#include "tools/options/syntax/option_texts.h"
 
 namespace braid {
+
+namespace {
+
+const std::vector<std::pair<std::string, ToneCurve>> kToneCurves{{nameOf(ToneCurve::Neutral), ToneCurve::Neutral},
+                                                                 {nameOf(ToneCurve::Agx), ToneCurve::Agx},
+                                                                 {nameOf(ToneCurve::Aces), ToneCurve::Aces},
+                                                                 {nameOf(ToneCurve::None), ToneCurve::None}};
+
+}  // namespace
 
 CLI::Option* addOutput(CLI::App& command, std::string& file) {
   return command
@@ -20,6 +31,15 @@ CLI::Option* addOutput(CLI::App& command, std::string& file) {
                   "Image to write, by its ending: .exr with layers; .png, .jpg tone-mapped; .hdr, .tif linear; - is "
                   "EXR to standard output")
       ->type_name("FILE");
+}
+
+void addToneOptions(CLI::App& command, ToneChoice& choice) {
+  addNamed(command, "--tone", choice.curve, NamedValues<ToneCurve>{"tone curve", kToneCurves},
+           "Tone curve of PNG, JPEG and previews: neutral (Khronos PBR Neutral), agx, aces, or none (cut off at 1)");
+  addParsed(command, "--exposure", choice.exposure, parseExposure,
+            "Exposure of PNG, JPEG and previews in stops, or auto: by the log-average; printed")
+      ->default_str("auto")
+      ->type_name("EV");
 }
 
 AovSet parseAovs(const std::string& name) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "renderer/film/files/exr.h"
+#include "renderer/film/files/tone.h"
 
 namespace CLI {
 class App;
@@ -15,6 +16,9 @@ namespace braid {
 
 // -o,--output: an image in the format of its ending.
 CLI::Option* addOutput(CLI::App& command, std::string& file);
+
+// --tone and --exposure, of formats for eyes.
+void addToneOptions(CLI::App& command, ToneChoice& choice);
 
 // none, features or all. Throws Error(Usage).
 AovSet parseAovs(const std::string& name);

@@ -20,6 +20,9 @@ const std::vector<std::pair<std::string, PixelFilter>> kFilters{
 const std::vector<std::pair<std::string, LightStrategy>> kLights{
     {"auto", LightStrategy::Automatic}, {"power", LightStrategy::Power}, {"hierarchy", LightStrategy::Hierarchy}};
 
+const std::vector<std::pair<std::string, DefaultLight>> kDefaultLights{
+    {"studio", DefaultLight::Studio}, {"dome", DefaultLight::Dome}, {"none", DefaultLight::None}};
+
 void addViewOptions(CLI::App& command, SceneChoice& c) {
   addSize(command, c.size, "Full frame in pixels");
   addParsed(command, "--crop", c.crop, parseWindow, "Only this part of the frame: upper left origin, ends excluded")
@@ -29,6 +32,12 @@ void addViewOptions(CLI::App& command, SceneChoice& c) {
       ->type_name("ox,oy,oz,tx,ty,tz");
   command.add_option("--yfov", c.yfovDegrees, "Vertical field of view in degrees")
       ->check(number(0, 180, Ends::Excluded));
+  addParsed(command, "--aperture", c.aperture, parseAperture,
+            "Depth of field: the lens's width as f/N (of a camera with a frame 24 mm high) or in metres (default: 0)")
+      ->type_name("f/N|METRES");
+  addParsed(command, "--focus", c.focus, parseFocus,
+            "What is sharp: metres along the view, or what this pixel sees (default: the middle of the frame)")
+      ->type_name("METRES|X,Y");
 }
 
 void addFrameOptions(CLI::App& command, SceneChoice& c) {
@@ -59,8 +68,14 @@ void addLightOptions(CLI::App& command, SceneChoice& c) {
   command.add_option("--light-scale", c.lightScale, "Multiply every light and emitter of the file")
       ->capture_default_str()
       ->check(number(0, kLargeNumber));
-  command.add_flag("--no-default-light", c.noDefaultLight,
-                   "No grey dome where the file's lights leave the picture dark");
+  addNamed(
+      command, "--default-light", c.defaultLight, {"default light", kDefaultLights},
+      "Where the file's lights leave the picture dark: studio (soft boxes, a neutral backdrop), dome (grey), none");
+  command.add_flag("--ground", c.ground,
+                   "A matte ground under the scene that shows its shadows and has the colour of the backdrop; with "
+                   "--transparent its alpha is the shadow");
+  command.add_flag_callback(
+      "--no-default-light", [&c] { c.defaultLight = DefaultLight::None; }, "--default-light none");
 }
 
 void addLoadOptions(CLI::App& command, SceneChoice& c) {
@@ -89,6 +104,12 @@ void addPhotonOptions(CLI::App& command, SampleChoice& c) {
 }
 
 }  // namespace
+
+const char* toString(DefaultLight light) {
+  for (const auto& [name, one] : kDefaultLights)
+    if (one == light) return name.c_str();
+  return "";
+}
 
 const char* toString(SamplerKind sampler) { return sampler == SamplerKind::Sobol ? "sobol" : "independent"; }
 

@@ -30,7 +30,10 @@ struct SceneChoice {
   double environmentScale = 1;
   double lightScale = 1;
   std::optional<Spectrum> background;
-  bool noDefaultLight = false;
+  DefaultLight defaultLight = DefaultLight::Studio;
+  bool ground = false;
+  std::optional<Aperture> aperture;
+  std::optional<Focus> focus;
   std::string isa = "avx2";
   bool full = false;
   int frameScene = -1;
@@ -61,6 +64,7 @@ CLI::Option* addSize(CLI::App& command, FrameSize& size, const char* description
 CLI::Option* addSampler(CLI::App& command, SamplerKind& sampler);
 CLI::Option* addIsa(CLI::App& command, std::string& isa);
 const char* toString(SamplerKind sampler);
+const char* toString(DefaultLight light);
 
 // Settings from the two groups of options.
 Settings makeSettings(const SceneChoice& scene, const SampleChoice& samples);

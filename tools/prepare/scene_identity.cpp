@@ -18,6 +18,12 @@ std::string environmentHash(const SceneChoice& c, const SceneData& data) {
   return fmt::format("{}x{}:{}", image.width, image.height, hexString(hash.value()));
 }
 
+std::string focusText(const SceneChoice& c) {
+  if (!c.focus) return "the middle";
+  return c.focus->pixel ? fmt::format("{},{}", c.focus->pixel->first, c.focus->pixel->second)
+                        : fmt::format("{}", c.focus->metres);
+}
+
 const char* yesOrNo(bool yes) { return yes ? "on" : "off"; }
 
 }  // namespace
@@ -32,8 +38,11 @@ std::vector<StateOption> sceneIdentity(const SceneChoice& c, const SceneData& da
           {"--frame-time", fmt::format("{}", c.frameTime)},
           {"--animation", c.load.animation},
           {"--double-sided", yesOrNo(c.load.doubleSided)},
-          {"--no-default-light", yesOrNo(c.noDefaultLight)},
-          {"the default light", yesOrNo(data.defaultLight)}};
+          {"--default-light", toString(c.defaultLight)},
+          {"the default light", yesOrNo(data.defaultLight)},
+          {"--ground", yesOrNo(c.ground)},
+          {"--aperture", c.aperture ? fmt::format("f/{} {}", c.aperture->fNumber, c.aperture->metres) : "none"},
+          {"--focus", focusText(c)}};
 }
 
 }  // namespace braid

@@ -71,6 +71,7 @@ void append(std::string& pixels, uint16_t bits) {
 std::shared_ptr<PreviewImage> encode(const Rgb<float>& image) {
   auto p = emptyImage(image.width(), image.height(), 3);
   p->exponent = exponentFor(image);
+  p->autoExposure = autoExposure(image);
   const float scale = std::ldexp(1.0f, p->exponent);
   for (size_t i = 0; i < image.size(); ++i)
     for (size_t c = 0; c < 3; ++c) append(p->pixels, halfBitsOrNan(scale * image[c][i]));
@@ -94,8 +95,8 @@ uint64_t newRun() {
 
 }  // namespace
 
-PreviewBoard::PreviewBoard(std::string scene, std::vector<std::string> files, double exposure)
-    : run_(newRun()), scene_(std::move(scene)), files_(std::move(files)), exposure_(exposure) {}
+PreviewBoard::PreviewBoard(std::string scene, std::vector<std::string> files, const ToneChoice& tone)
+    : run_(newRun()), scene_(std::move(scene)), files_(std::move(files)), tone_(tone) {}
 
 void PreviewBoard::changed() {
   ++version_;
@@ -249,7 +250,8 @@ nlohmann::json PreviewBoard::state() const {
           {"secondsLeft", progress_.secondsLeft >= 0 ? json(progress_.secondsLeft) : json(nullptr)},
           {"rate", {{"spp", spp}, {"paths", spp * integrators_ * width * height}}},
           {"rejectedSamples", progress_.rejected},
-          {"exposure", exposure_},
+          {"exposure", tone_.exposure ? json(*tone_.exposure) : json("auto")},
+          {"tone", nameOf(tone_.curve)},
           {"combiner", combiner_},
           {"plan", plan_},
           {"estimatedError", error},

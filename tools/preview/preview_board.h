@@ -27,11 +27,12 @@ enum class PreviewPhase { Loading, Rendering, Saving, Ended };
 // Pixels for a page: 16-bit floats, little-endian, row after row, channels interleaved.
 struct PreviewImage {
   int width = 0, height = 0;
-  int channels = 0;      // 3: radiance; 1: relative error
-  int exponent = 0;      // values are multiplied by 2^exponent to suit the range of 16-bit floats
-  uint64_t spp = 0;      // of the estimates that it was made from
-  double seconds = 0;    // of the render by then
-  uint64_t version = 0;  // changes with every new image
+  int channels = 0;        // 3: radiance; 1: relative error
+  int exponent = 0;        // values are multiplied by 2^exponent to suit the range of 16-bit floats
+  uint64_t spp = 0;        // of the estimates that it was made from
+  double seconds = 0;      // of the render by then
+  uint64_t version = 0;    // changes with every new image
+  float autoExposure = 0;  // of radiance: what brings it to middle grey, in stops
   std::string pixels;
 };
 
@@ -39,8 +40,8 @@ class PreviewBoard {
  public:
   static constexpr double kProgressInterval = 0.25;  // seconds of the render between changes by progress alone
 
-  // Before the render starts. `exposure`: in stops, what a page begins with.
-  PreviewBoard(std::string scene, std::vector<std::string> files, double exposure);
+  // Before the render starts. `tone`: what a page begins with.
+  PreviewBoard(std::string scene, std::vector<std::string> files, const ToneChoice& tone);
 
   void setPhase(PreviewPhase phase);
   void setPlan(std::string plan, std::string combiner, int integrators);
@@ -82,7 +83,7 @@ class PreviewBoard {
   const uint64_t run_;  // tells runs apart
   const std::string scene_;
   const std::vector<std::string> files_;
-  const double exposure_;
+  const ToneChoice tone_;
   std::string plan_, combiner_ = "none", reason_;
   int integrators_ = 1;
   std::vector<std::string> saved_, warnings_;

@@ -133,6 +133,7 @@ void PreviewServer::Implementation::sendImage(const httplib::Request& request, h
   response.set_header("X-Braid-Height", std::to_string(image->height));
   response.set_header("X-Braid-Channels", std::to_string(image->channels));
   response.set_header("X-Braid-Exponent", std::to_string(image->exponent));
+  response.set_header("X-Braid-Auto-Exposure", fmt::format("{:.2f}", image->autoExposure));
   response.set_header("X-Braid-Spp", std::to_string(image->spp));
   response.set_header("X-Braid-Version", std::to_string(image->version));
   response.set_content_provider(image->pixels.size(), "application/octet-stream",

@@ -5,7 +5,7 @@
 //   GET /                  the page
 //   GET /state.json        what PreviewBoard::state() says; ?after=VERSION waits until there is something newer
 //   GET /image?view=NAME   pixels as PreviewImage holds them, described by the headers X-Braid-Width, -Height,
-//                          -Channels, -Exponent, -Spp, -Version
+//                          -Channels, -Exponent, -Auto-Exposure, -Spp, -Version
 //   POST /stop             ends the render as if its samples were done
 #pragma once
 

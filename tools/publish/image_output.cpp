@@ -112,10 +112,10 @@ void checkImageFiles(const ImageOutput& output) {
 }
 
 std::string writeImageFile(const std::string& path, const Estimates& estimates, const Rgb<float>& image,
-                           const Plane<float>* alpha, const ExrOptions& exr, double exposureStops) {
+                           const Plane<float>* alpha, const ExrOptions& exr, const Tone& tone) {
   const ImageFormat format = imageFormat(path);
   if (format != ImageFormat::Exr) {
-    writePicture(path, format, image, alpha, static_cast<float>(exposureStops));
+    writePicture(path, format, image, alpha, tone);
     return "";
   }
   const WriteReport report = writeExr(path, estimates, image, alpha, exr);
@@ -124,12 +124,20 @@ std::string writeImageFile(const std::string& path, const Estimates& estimates, 
                      report.clampedToHalf);
 }
 
+std::optional<Tone> toneOf(const std::string& file, const std::string& png, const ToneChoice& choice,
+                           const Rgb<float>& image, const Plane<float>* alpha) {
+  if (png.empty() && (file.empty() || !isForDisplay(imageFormat(file)))) return std::nullopt;
+  return toneFor(choice, image, alpha);
+}
+
+std::string describe(const Tone& tone) {
+  return fmt::format("shown with --tone {} --exposure {:.4g}", nameOf(tone.curve), tone.exposureStops);
+}
+
 void addImageOptions(CLI::App& command, ImageOutput& o) {
   addOutput(command, o.file);
   command.add_option("--png", o.png, "Also write a tone-mapped PNG")->type_name("FILE");
-  command.add_option("--exposure", o.exposure, "Exposure of PNG and JPEG in stops")
-      ->capture_default_str()
-      ->check(number(-64, 64));
+  addToneOptions(command, o.tone);
   addWords(command, "--combine", o.combine.methods, parseMethods,
            "none, or methods of --list; the last one makes the image")
       ->default_str(o.combine.text())
@@ -148,7 +156,7 @@ void addImageOptions(CLI::App& command, ImageOutput& o) {
   command.add_option("--layer-prefix", o.layerPrefix, "Put before every layer's name, e.g. ViewLayer")
       ->type_name("NAME");
   command.add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
-  showFirst(command, kOutputHelp, {"--output", "--png", "--exposure", "--combine", "--aovs"});
+  showFirst(command, kOutputHelp, {"--output", "--png", "--tone", "--exposure", "--combine", "--aovs"});
 }
 
 void showImages(const Estimates& estimates, const PipelineResult& combined, const std::vector<std::string>& wanted,
@@ -204,14 +212,16 @@ WrittenImage writeImage(const ImageOutput& o, Estimates& estimates, const Plane<
     written.warnings = combineWarnings(combined, o.combine.asked);
     if (const std::string missing = lightOutOfReach(estimates); !missing.empty())
       written.warnings.push_back(missing + "; the error of this image is not known");
+    written.tone = toneOf(o.file, o.png, o.tone, headline, alpha);
+    const Tone tone = written.tone.value_or(Tone());
     // Beside each other: a PNG is compressed by one thread.
     std::string warning;
     bothWhateverFails(
         [&] {
-          if (!o.file.empty()) warning = writeImageFile(o.file, estimates, headline, alpha, exr, o.exposure);
+          if (!o.file.empty()) warning = writeImageFile(o.file, estimates, headline, alpha, exr, tone);
         },
         [&] {
-          if (!o.png.empty()) writePicture(o.png, ImageFormat::Png, headline, alpha, static_cast<float>(o.exposure));
+          if (!o.png.empty()) writePicture(o.png, ImageFormat::Png, headline, alpha, tone);
         });
     if (!warning.empty()) written.warnings.push_back(std::move(warning));
     written.writeSeconds = writing.seconds();

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "renderer/film/files/exr.h"
+#include "renderer/film/files/tone.h"
 #include "renderer/film/kept_buffers.h"
 #include "tools/options/combining.h"
 
@@ -34,7 +35,7 @@ struct ImageOutput {
   std::string file, png;       // empty: not written; the ending says the format of `file`
   std::optional<AovSet> aovs;  // none: see aovSet()
   std::string layerPrefix;
-  double exposure = 0;
+  ToneChoice tone;
   bool quarters = false, history = false, directIndirect = false, floatHeadline = false, noTiming = false;
   CombineChoice combine;
   ShowImages show;  // called between combining and writing, if there is one
@@ -59,12 +60,20 @@ void checkImageFiles(const ImageOutput& output);
 
 // One image in the format that the ending of `path` says. Returns a warning, or nothing.
 std::string writeImageFile(const std::string& path, const Estimates& estimates, const Rgb<float>& image,
-                           const Plane<float>* alpha, const ExrOptions& exr, double exposureStops);
+                           const Plane<float>* alpha, const ExrOptions& exr, const Tone& tone);
+
+// How an image is shown, if `file` is for eyes or `png` is asked for.
+std::optional<Tone> toneOf(const std::string& file, const std::string& png, const ToneChoice& choice,
+                           const Rgb<float>& image, const Plane<float>* alpha);
+
+// A line for people.
+std::string describe(const Tone& tone);
 
 // What became of one writing.
 struct WrittenImage {
   // relativeError() of the headline; none where the headline's method does not estimate its error.
   std::optional<double> error;
+  std::optional<Tone> tone;  // of the files for eyes
   double combineSeconds = 0, writeSeconds = 0;
   double secondsOfRun = 0;                     // that the pass loop was held up for it
   std::vector<std::string> warnings, timings;  // one line each

@@ -74,7 +74,7 @@ ImageFile readImage(const std::string& path);
 // Whether the file holds the layer, in one of the forms that rgb() takes.
 bool hasLayer(const ImageFile& file, const std::string& prefix);
 
-// Tone-mapped 8-bit PNG: writePicture() without alpha.
+// 8-bit PNG without a tone curve and alpha: writePicture().
 void writePng(const std::string& path, const Rgb<float>& image, float exposureStops = 0);
 
 }  // namespace braid

@@ -62,7 +62,7 @@ void write(const std::string& path, ImageFormat format, const ImageHeader& heade
 }
 
 std::vector<Attribute> attributesOf(ImageFormat format, bool alpha) {
-  const bool forEyes = format == ImageFormat::Png || format == ImageFormat::Jpeg;
+  const bool forEyes = isForDisplay(format);
   std::vector<Attribute> list{textAttribute("oiio:ColorSpace", forEyes ? "sRGB" : "Linear")};
   // OpenImageIO adds the date of writing when there is none; files must reproduce byte for byte.
   list.push_back(textAttribute("DateTime", ""));
@@ -90,28 +90,29 @@ ImageFormat imageFormat(const std::string& path) {
                                    ": known are " + known);
 }
 
-std::vector<uint8_t> toneMapped(const Rgb<float>& image, const Plane<float>* alpha, float exposureStops) {
-  const float scale = std::exp2(exposureStops);
+bool isForDisplay(ImageFormat format) { return format == ImageFormat::Png || format == ImageFormat::Jpeg; }
+
+std::vector<uint8_t> toneMapped(const Rgb<float>& image, const Plane<float>* alpha, const Tone& tone) {
+  const float scale = std::exp2(tone.exposureStops);
   const size_t channels = alpha ? 4 : 3;
   std::vector<uint8_t> bytes(channels * image.size());
-  // max before min: NaN becomes black.
-  const auto clamped = [](float v) { return std::min(std::max(0.0f, v), 1.0f); };
+  const auto byteOf = [](float v) { return static_cast<uint8_t>(std::min(std::max(0.0f, v), 1.0f) * 255 + 0.5f); };
   parallelChunks(image.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
-      for (size_t c = 0; c < 3; ++c) {
-        const float v = alpha ? unassociated(image[c][i], (*alpha)[i]) : image[c][i];
-        bytes[channels * i + c] = static_cast<uint8_t>(encodeSrgb(clamped(scale * v)) * 255 + 0.5f);
-      }
-      if (alpha) bytes[channels * i + 3] = static_cast<uint8_t>(clamped((*alpha)[i]) * 255 + 0.5f);
+      Vec3 v = image.pixel(i);
+      for (int c = 0; c < 3 && alpha; ++c) v[c] = unassociated(v[c], (*alpha)[i]);
+      const Vec3 shown = toDisplay(tone.curve, scale * v);
+      for (int c = 0; c < 3; ++c) bytes[channels * i + static_cast<size_t>(c)] = byteOf(shown[c]);
+      if (alpha) bytes[channels * i + 3] = byteOf((*alpha)[i]);
     }
   });
   return bytes;
 }
 
 void writePicture(const std::string& path, ImageFormat format, const Rgb<float>& image, const Plane<float>* alpha,
-                  float exposureStops) {
+                  const Tone& tone) {
   BRAID_ASSERT(!image.empty() && format != ImageFormat::Exr);
-  const bool forEyes = format == ImageFormat::Png || format == ImageFormat::Jpeg;
+  const bool forEyes = isForDisplay(format);
   if (format == ImageFormat::Jpeg || format == ImageFormat::Hdr) alpha = nullptr;
   ImageHeader header;
   header.width = image.width();
@@ -124,7 +125,7 @@ void writePicture(const std::string& path, ImageFormat format, const Rgb<float>&
   }
   header.attributes = attributesOf(format, alpha != nullptr);
   if (forEyes)
-    write(path, format, header, toneMapped(image, alpha, exposureStops).data());
+    write(path, format, header, toneMapped(image, alpha, tone).data());
   else
     write(path, format, header, linear(image, alpha).data());
 }

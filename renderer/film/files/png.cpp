@@ -5,7 +5,7 @@
 namespace braid {
 
 void writePng(const std::string& path, const Rgb<float>& image, float exposureStops) {
-  writePicture(path, ImageFormat::Png, image, nullptr, exposureStops);
+  writePicture(path, ImageFormat::Png, image, nullptr, {ToneCurve::None, exposureStops});
 }
 
 }  // namespace braid

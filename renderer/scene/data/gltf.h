@@ -18,12 +18,12 @@ struct LoadOptions {
   std::optional<float> frameTime;  // seconds into the animation; none: the rest pose
   std::string animation;           // the clip that frameTime is in, by name or index; empty: the first
   std::string camera;              // name or index of the camera that will look; empty: the first, "none": none
-  bool defaultLight = true;        // add a grey dome to a file without any light or emitter
-  bool doubleSided = false;        // treat every material as double-sided
-  bool allowExternal = false;      // files may lie outside of the folder of the scene
-  bool strict = false;             // refuse a file with any problem, listing all of them
-  std::vector<std::string> ignoredExtensions;  // required ones that are unknown but not refused
-  bool keepAllAttributes = false;              // --full: keep uv, colours and tangents that no material reads
+  DefaultLight defaultLight = DefaultLight::Studio;  // what a file without any light or emitter gets
+  bool doubleSided = false;                          // treat every material as double-sided
+  bool allowExternal = false;                        // files may lie outside of the folder of the scene
+  bool strict = false;                               // refuse a file with any problem, listing all of them
+  std::vector<std::string> ignoredExtensions;        // required ones that are unknown but not refused
+  bool keepAllAttributes = false;                    // --full: keep uv, colours and tangents that no material reads
 };
 
 // Loads and validates a file. Throws SceneError: exit code BadInput (nothing is left to render, the file is unsafe, or

@@ -36,6 +36,7 @@ struct Material {
   Spectrum emission{0};  // emissiveFactor · emissiveStrength, W·sr⁻¹·m⁻²
   TextureRef emissiveTexture;
 
+  bool isGround = false;  // addGround()
   AlphaMode alphaMode = AlphaMode::Opaque;
   float alphaCutoff = 0.5f;
   bool doubleSided = false;

@@ -63,6 +63,8 @@ struct CameraData {
   float yfov = 0.8f;            // radians, full vertical angle (perspective)
   std::optional<float> aspect;  // width / height; none: that of the output
   float xmag = 1, ymag = 1;     // half extents (orthographic), metres
+  float lensRadius = 0;         // metres; 0: a pinhole (perspective)
+  float focusDistance = 1;      // metres along the view, of the plane that is sharp
 };
 
 // A latitude-longitude environment: up is +Y, the centre of the image lies in direction +X and what is right of it
@@ -71,6 +73,13 @@ struct EnvironmentData {
   std::shared_ptr<const Image> image;  // null: the constant `radiance`
   Spectrum radiance{0};                // constant radiance, or the scale of the image
   float rotation = 0;                  // radians about +Y
+};
+
+// What lights a file that has no light of its own.
+enum class DefaultLight {
+  None,
+  Dome,   // a constant environment, which the camera sees
+  Studio  // studioEnvironment(), of which the camera sees a neutral backdrop
 };
 
 // A clip of the file, for lists.
@@ -91,6 +100,8 @@ struct SceneData {
   std::vector<PunctualLight> lights;
   std::vector<CameraData> cameras;
   std::optional<EnvironmentData> environment;
+  std::optional<Spectrum> backdrop;  // what the camera sees of the environment; none: the environment
+  std::optional<Spectrum> ground;    // radiance of the ground where nothing shadows it; none: there is no ground
 
   // For `braid info`.
   std::vector<std::string> extensionsUsed, extensionsRequired, extensionsIgnored;
@@ -100,8 +111,8 @@ struct SceneData {
   std::vector<std::string> warnings;  // one line each, already counted
   std::vector<std::string> notes;     // flaws of what the picture does not use
   uint64_t contentHash = 0;           // over every referenced byte
-  bool defaultCamera = false;         // the file had none: framed from the bounds
-  bool defaultLight = false;          // the file had none: a grey dome
+  bool defaultCamera = false;         // the file had none: framingCamera()
+  bool defaultLight = false;          // the file had none, or next to none: a dome, or a studio with a backdrop
 };
 
 }  // namespace braid

@@ -5,11 +5,17 @@
 #include <array>
 #include <cmath>
 
+#include "renderer/scene/data/ground.h"
+#include "renderer/scene/data/studio.h"
+
 namespace braid {
 
 namespace {
 
-constexpr float kDefaultYfov = 0.7f;
+// Of the frame, by what it is to show; by a room, around whose open side there is nothing.
+constexpr float kFramedPart = 0.85f, kFramedPartOfRoom = 0.98f;
+// Vertices of more triangles would take longer to look at than they are worth: corners of bounds stand for them.
+constexpr size_t kMostLookedAt = 2'000'000;
 
 Bounds localBounds(const TriangleMesh& mesh) {
   Bounds bounds;
@@ -19,6 +25,68 @@ Bounds localBounds(const TriangleMesh& mesh) {
 
 Vec3 corner(const Bounds& b, int index) {
   return {index & 1 ? b.hi.x : b.lo.x, index & 2 ? b.hi.y : b.lo.y, index & 4 ? b.hi.z : b.lo.z};
+}
+
+size_t placedTriangles(const SceneData& scene) {
+  size_t triangles = 0;
+  for (const MeshInstance& instance : scene.instances) triangles += scene.meshes[instance.mesh].triangles.size();
+  return triangles;
+}
+
+bool isVisible(const Material& m) { return m.alphaMode == AlphaMode::Opaque || m.alpha > 0; }
+
+// The points that a camera has to see, in axes `toView` about `centre`.
+std::vector<Vec3> pointsToFrame(const SceneData& scene, const Mat3& toView, const Vec3& centre) {
+  const bool every = placedTriangles(scene) <= kMostLookedAt;
+  std::vector<Vec3> points;
+  for (const MeshInstance& instance : scene.instances) {
+    const TriangleMesh& mesh = scene.meshes[instance.mesh];
+    if (!isVisible(scene.materials[mesh.material])) continue;
+    const auto add = [&](const Vec3& p) { points.push_back(toView * (Vec3(instance.toWorld * Vec4(p, 1)) - centre)); };
+    if (every) {
+      std::vector<bool> used(mesh.positions.size());  // stray vertices show nothing
+      for (const glm::uvec3& t : mesh.triangles) used[t.x] = used[t.y] = used[t.z] = true;
+      for (size_t i = 0; i < used.size(); ++i)
+        if (used[i]) add(mesh.positions[i]);
+    } else {
+      const Bounds bounds = localBounds(mesh);
+      for (int k = 0; k < 8; ++k) add(corner(bounds, k));
+    }
+  }
+  return points;
+}
+
+// Where planes through the points touch them whose slope to the view is `slope`: a frame of that tangent has to stand
+// at z = (high + low) / (2 slope) or farther, and is filled at x = (high - low) / 2 there.
+struct Touch {
+  float high = 0, low = 0;
+  float distance(float slope) const { return (high + low) / (2 * slope); }
+};
+Touch touch(const std::vector<Vec3>& points, int axis, float slope) {
+  Touch t{-kInfinity, -kInfinity};
+  for (const Vec3& p : points) {
+    t.high = std::max(t.high, p[axis] + slope * p.z);
+    t.low = std::max(t.low, -p[axis] + slope * p.z);
+  }
+  return t;
+}
+
+// The eye, in the axes of the points, from which they span their part of the frame, centred in both directions.
+Vec3 framingEye(const std::vector<Vec3>& points, Vec2 slopes) {
+  const float distance =
+      std::max(touch(points, 0, slopes.x).distance(slopes.x), touch(points, 1, slopes.y).distance(slopes.y));
+  Vec3 eye(0, 0, distance);
+  for (int axis = 0; axis < 2; ++axis) {
+    float slope = slopes[axis];
+    for (int i = 0; i < 8; ++i) {
+      const Touch t = touch(points, axis, slope);
+      eye[axis] = 0.5f * (t.high - t.low);
+      const float fitting = distance > 0 ? (t.high + t.low) / (2 * distance) : slope;
+      if (!(fitting > 0) || fitting > slope) break;
+      slope = fitting;
+    }
+  }
+  return eye;
 }
 
 // The part of each of the six sides of the bounds that triangles close, as in a room: sides 2a (low) and 2a + 1 (high)
@@ -52,10 +120,7 @@ std::array<float, 6> closedSides(const SceneData& scene, const Bounds& bounds) {
 
 // The way out of a box with one open side: straight through it.
 std::optional<Vec3> openSide(const SceneData& scene, const Bounds& bounds) {
-  // Rooms are simple; counting the triangles of large scenes would cost more than it tells.
-  size_t triangles = 0;
-  for (const MeshInstance& instance : scene.instances) triangles += scene.meshes[instance.mesh].triangles.size();
-  if (triangles > 2'000'000) return {};
+  if (placedTriangles(scene) > kMostLookedAt) return {};
   const std::array<float, 6> closed = closedSides(scene, bounds);
   if (std::count_if(closed.begin(), closed.end(), [](float part) { return part > 0.6f; }) != 5) return {};
   Vec3 direction(0);
@@ -66,8 +131,7 @@ std::optional<Vec3> openSide(const SceneData& scene, const Bounds& bounds) {
 }
 
 // From the centre towards the camera. Things in glTF face +Z.
-Vec3 viewDirection(const SceneData& scene, const Bounds& bounds) {
-  if (const std::optional<Vec3> open = openSide(scene, bounds)) return *open;
+Vec3 viewDirection(const Bounds& bounds) {
   const Vec3 extent = bounds.diagonal();
   const int thin = extent.z <= extent.x && extent.z <= extent.y ? 2 : extent.y <= extent.x ? 1 : 0;
   const float next = std::min(extent[(thin + 1) % 3], extent[(thin + 2) % 3]);
@@ -101,27 +165,40 @@ Bounds worldBounds(const SceneData& scene) {
   return bounds;
 }
 
-CameraData framingCamera(const SceneData& scene) {
+CameraData framingCamera(const SceneData& scene, float aspect, float yfov) {
   CameraData camera;
   camera.name = "default";
-  camera.yfov = kDefaultYfov;
+  camera.yfov = yfov;
   const Bounds bounds = worldBounds(scene);
-  if (bounds.empty()) {
-    camera.toWorld = lookAlong(Vec3(0, 0, 3), Vec3(0, 0, 1));
-    return camera;
-  }
-  const Vec3 back = viewDirection(scene, bounds);
-  const Mat4 orientation = lookAlong(Vec3(0), back);
-  // The nearest distance from which every corner of the bounds lies in a frame of aspect 4:3, with a margin of 5 %.
-  const float tanY = std::tan(0.5f * kDefaultYfov) / 1.05f, tanX = tanY * 4 / 3;
-  float distance = 0;
-  for (int k = 0; k < 8; ++k) {
-    const Vec3 d = corner(bounds, k) - bounds.centre();
-    const float x = std::abs(glm::dot(d, Vec3(orientation[0]))), y = std::abs(glm::dot(d, Vec3(orientation[1])));
-    distance = std::max(distance, glm::dot(d, back) + std::max(x / tanX, y / tanY));
-  }
-  camera.toWorld = lookAlong(bounds.centre() + back * (distance > 0 ? distance : 3.0f), back);
+  camera.toWorld = lookAlong(Vec3(0, 0, 3), Vec3(0, 0, 1));
+  if (bounds.empty()) return camera;
+  const std::optional<Vec3> open = openSide(scene, bounds);
+  const Vec3 back = open ? *open : viewDirection(bounds);
+  const Mat3 toWorld(lookAlong(Vec3(0), back));
+  const std::vector<Vec3> points = pointsToFrame(scene, glm::transpose(toWorld), bounds.centre());
+  if (points.empty()) return camera;
+  const float slope = (open ? kFramedPartOfRoom : kFramedPart) * std::tan(0.5f * yfov);
+  Vec3 eye = framingEye(points, {slope * aspect, slope});
+  if (!(eye.z > 0)) eye.z = 3;
+  camera.toWorld = lookAlong(bounds.centre() + toWorld * eye, back);
   return camera;
+}
+
+void giveDefaultLight(SceneData& scene, DefaultLight kind, float scale) {
+  scene.defaultLight = true;
+  if (kind == DefaultLight::Studio) {
+    scene.environment = studioEnvironment(kDefaultDome * scale);
+    scene.backdrop = openGroundRadiance(scene);
+  } else {
+    scene.environment = EnvironmentData{nullptr, Spectrum(kDefaultDome * scale), 0};
+  }
+  if (scene.ground) matchBackdrop(scene);
+}
+
+std::string describeDefaultLight(DefaultLight kind) {
+  return kind == DefaultLight::Studio
+             ? "a studio is added (--no-default-light: none; --default-light dome: a grey dome)"
+             : "a grey dome of radiance 0.5 is added (--no-default-light: none)";
 }
 
 bool hasLight(const SceneData& scene) {

@@ -21,15 +21,14 @@ void addDefaults(SceneData& scene, const LoadOptions& options, Report& report) {
   if (scene.cameras.empty()) {
     scene.cameras.push_back(framingCamera(scene));
     scene.defaultCamera = true;
-    report.warn("", "the file has no camera; one is added that sees the whole scene");
+    report.warn("", "the file has no camera; one is added that frames what is to be seen");
   }
-  if (options.defaultLight && !hasLight(scene)) {
+  if (options.defaultLight != DefaultLight::None && !hasLight(scene)) {
     const bool dark = !scene.lights.empty() || std::any_of(scene.materials.begin(), scene.materials.end(),
                                                            [](const Material& m) { return m.emissive(); });
-    scene.environment = EnvironmentData{nullptr, Spectrum(kDefaultDome), 0};
-    scene.defaultLight = true;
-    report.warn("", std::string(dark ? "the lights of the file emit nothing" : "the file has no light") +
-                        "; a grey dome of radiance 0.5 is added (--no-default-light: none)");
+    giveDefaultLight(scene, options.defaultLight);
+    report.warn("", std::string(dark ? "the lights of the file emit nothing" : "the file has no light") + "; " +
+                        describeDefaultLight(options.defaultLight));
   }
 }
 

@@ -267,17 +267,15 @@ TEST_CASE("gltf: cameras ignore scale and keep the order of the scene") {
   CHECK_FALSE(scene.defaultCamera);
 }
 
-TEST_CASE("gltf: a default camera sees every corner of the bounds") {
+TEST_CASE("gltf: a default camera sees every vertex") {
   GltfFile file = triangleFile();
   file.node()["translation"] = {30, 0, 0};
   const SceneData scene = file.load();
   CHECK(scene.defaultCamera);
   REQUIRE(scene.cameras.size() == 1);
   const CameraData& camera = scene.cameras[0];
-  const Vec3 toCentre = Vec3(30.5f, 0.5f, 0) - Vec3(camera.toWorld[3]);
-  CHECK(isNear(glm::normalize(toCentre), -Vec3(camera.toWorld[2])));
   const Camera view(camera, 400, 300);
-  for (const Vec3& p : {Vec3(30, 0, 0), Vec3(31, 0, 0), Vec3(30, 1, 0), Vec3(31, 1, 0)}) {
+  for (const Vec3& p : {Vec3(30, 0, 0), Vec3(31, 0, 0), Vec3(30, 1, 0)}) {
     const auto raster = view.project(p);
     REQUIRE(raster);
     CHECK((raster->x > 0 && raster->x < 400 && raster->y > 0 && raster->y < 300));
@@ -326,7 +324,7 @@ TEST_CASE("gltf: a dark file gets a grey dome, unless told otherwise") {
   REQUIRE(scene.environment);
   CHECK(scene.environment->radiance == Spectrum(0.5f));
   LoadOptions options;
-  options.defaultLight = false;
+  options.defaultLight = DefaultLight::None;
   CHECK_FALSE(file.load(options).environment);
   giveMaterial(file, {{"emissiveFactor", {1, 0, 0}}});
   CHECK_FALSE(file.load().defaultLight);

@@ -24,7 +24,7 @@ Rgb<float> grey(int width, int height, float value) { return Rgb<float>(width, h
 TEST_CASE("The board's images hold the pixels, whatever the unit of light") {
   for (const float unit : {1e-12f, 1e-6f, 1.0f, 1e6f, 1e12f}) {
     INFO(unit);
-    PreviewBoard board("scene", {}, 0);
+    PreviewBoard board("scene", {}, {});
     Rgb<float> image(5, 3);
     for (size_t c = 0; c < 3; ++c)
       for (size_t i = 0; i < image.size(); ++i) image[c][i] = unit * (0.1f + 0.05f * static_cast<float>(3 * i + c));
@@ -48,7 +48,7 @@ TEST_CASE("The board's images hold the pixels, whatever the unit of light") {
 }
 
 TEST_CASE("Error images are relative, and older images replace no newer ones") {
-  PreviewBoard board("scene", {}, 0);
+  PreviewBoard board("scene", {}, {});
   const Rgb<float> image = grey(2, 2, 0.5f);
   const Plane<float> error(2, 2, 0.26f * 0.04f), half(2, 2, 0.26f * 0.01f);
   board.show(8, 1, {&image, nullptr, &error, nullptr});
@@ -66,7 +66,7 @@ TEST_CASE("Error images are relative, and older images replace no newer ones") {
 }
 
 TEST_CASE("The history of a long preview stays short and keeps its newest point") {
-  PreviewBoard board("scene", {}, 0);
+  PreviewBoard board("scene", {}, {});
   const Rgb<float> image = grey(1, 1, 1);
   const Plane<float> error(1, 1, 1);
   uint64_t spp = 0;
@@ -79,7 +79,7 @@ TEST_CASE("The history of a long preview stays short and keeps its newest point"
 }
 
 TEST_CASE("Waiting for a change ends with one, with the time, and when the board closes") {
-  PreviewBoard board("scene", {}, 0);
+  PreviewBoard board("scene", {}, {});
   const auto seconds = [&](uint64_t version, double limit) {
     const auto start = std::chrono::steady_clock::now();
     board.waitForChange(version, limit);

@@ -98,6 +98,31 @@ LookAt parseLookAt(const std::string& text) {
   return {{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
 }
 
+std::optional<double> parseExposure(const std::string& text) {
+  constexpr double kMostStops = 64;
+  std::vector<double> n;
+  if (text == "auto") return {};
+  if (!readNumbers(text, "", n) || !(std::abs(n[0]) <= kMostStops))
+    refuseText(text, "auto, or a number of stops from -64 to 64");
+  return n[0];
+}
+
+Aperture parseAperture(const std::string& text) {
+  const bool isNumber = text.rfind("f/", 0) == 0;
+  std::vector<double> n;
+  if (!readNumbers(isNumber ? text.substr(2) : text, "", n) || !(n[0] > 0) || !(n[0] <= 1e9))
+    refuseText(text, "an f-number such as f/2.8, or metres such as 0.02, above 0 to 1e9");
+  return isNumber ? Aperture{n[0], 0} : Aperture{0, n[0]};
+}
+
+Focus parseFocus(const std::string& text) {
+  if (text.find(',') != std::string::npos) return {0, parsePixel(text)};
+  std::vector<double> n;
+  if (!readNumbers(text, "", n) || !(n[0] > 0) || !(n[0] <= 1e15))
+    refuseText(text, "metres above 0 to 1e15, or a pixel X,Y");
+  return {n[0], std::nullopt};
+}
+
 Spectrum parseBackground(const std::string& text) {
   const std::vector<double> n = parseNumbers(text, 3, 0, 1e20);  // what floats hold with room to spare
   return Spectrum(n[0], n[1], n[2]);

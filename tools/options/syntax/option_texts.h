@@ -3,6 +3,7 @@
 // expected; the command line puts the option's name before it.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -38,6 +39,23 @@ struct LookAt {
 };
 // ox,oy,oz,tx,ty,tz.
 LookAt parseLookAt(const std::string& text);
+
+// `auto` (none), or stops from -64 to 64.
+std::optional<double> parseExposure(const std::string& text);
+
+// The width of a lens: f/N, N times smaller than its focal length behind a frame 24 mm high, or in metres.
+struct Aperture {
+  double fNumber = 0;  // 0: `metres`
+  double metres = 0;
+};
+Aperture parseAperture(const std::string& text);
+
+// What is sharp: metres along the view, or what pixel X,Y sees.
+struct Focus {
+  double metres = 0;
+  std::optional<std::pair<int, int>> pixel;
+};
+Focus parseFocus(const std::string& text);
 
 // r,g,b, none of them negative.
 Spectrum parseBackground(const std::string& text);
