@@ -34,6 +34,7 @@ class Environment {
 
   std::shared_ptr<const Image> image_;
   Spectrum scale_{0};
+  float base_ = 0;
   Spectrum average_{0};
   float cosRotation_ = 1, sinRotation_ = 0;
   int width_ = 0, height_ = 0;

@@ -111,6 +111,26 @@ TEST_CASE("Studio: its mean radiance is that of the dome, from the left above mo
   CHECK(at({0, 0.01f, 1}) > at({0, -1, 0}));
 }
 
+TEST_CASE("Studio: light that is left to surfaces makes less than half the noise") {
+  // Variance over the squared values of what is seen: the lights are of the same power, but light other things.
+  const auto noise = [](DefaultLight kind, bool leaves) {
+    SceneData data = ballOnFloor();
+    giveDefaultLight(data, kind);
+    if (!leaves) data.environment->base = 0;
+    const RenderResult r = render(std::move(data), settingsFor(96, 64, 64));
+    double variance = 0, squares = 0;
+    for (size_t i = 0; i < r.image.size(); ++i) {
+      variance += static_cast<double>(estimateOf(r).variance[1][i]);
+      squares += sqr(static_cast<double>(r.image[1][i]));
+    }
+    return variance / squares;
+  };
+  const double studio = noise(DefaultLight::Studio, true), dome = noise(DefaultLight::Dome, true);
+  MESSAGE("relative variance under the studio over that under the dome: ", studio / dome);
+  CHECK(studio < 0.5 * noise(DefaultLight::Studio, false));
+  CHECK(studio < 5 * dome);
+}
+
 TEST_CASE("Studio: the camera sees the backdrop, mirrors see the studio, --background sees itself") {
   SceneData data = ballOnFloor();
   data.cameras = {cameraAt({0, 5, 0}, {0, 6, 0}, {0, 0, 1})};  // up, at nothing

@@ -100,7 +100,13 @@ class GltfFile {
     return glbOf(text + (binary.empty() ? "" : chunk(kBinaryChunk, binary, '\0')));
   }
 
-  SceneData load(const LoadOptions& options = {.defaultLight = DefaultLight::Dome}) const {
+  static LoadOptions plainLight() {
+    LoadOptions options;
+    options.defaultLight = DefaultLight::Dome;
+    return options;
+  }
+
+  SceneData load(const LoadOptions& options = plainLight()) const {
     const Folder folder;
     return loadGltf(folder.write("scene.glb", glb()), options);
   }

@@ -285,7 +285,7 @@ void addOutputOptions(CLI::App& command, CombineOptions& o) {
   command.add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
   addThreads(command, o.threads);
   command.add_flag("-q,--quiet", o.quiet, "Errors only");
-  showFirst(command, kOutputHelp, {"--output", "--png", "--tone", "--exposure", "--aovs", "--threads", "--quiet"});
+  showFirst(command, kOutputHelp, {"--output", "--png", "--exposure", "--aovs", "--threads", "--quiet"});
 }
 
 constexpr const char* kCombineHints =

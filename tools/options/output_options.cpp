@@ -37,7 +37,7 @@ void addToneOptions(CLI::App& command, ToneChoice& choice) {
   addNamed(command, "--tone", choice.curve, NamedValues<ToneCurve>{"tone curve", kToneCurves},
            "Tone curve of PNG, JPEG and previews: neutral (Khronos PBR Neutral), agx, aces, or none (cut off at 1)");
   addParsed(command, "--exposure", choice.exposure, parseExposure,
-            "Exposure of PNG, JPEG and previews in stops, or auto: by the log-average; printed")
+            "Exposure of PNG and JPEG in stops, or auto; printed")
       ->default_str("auto")
       ->type_name("EV");
 }

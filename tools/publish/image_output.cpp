@@ -156,7 +156,7 @@ void addImageOptions(CLI::App& command, ImageOutput& o) {
   command.add_option("--layer-prefix", o.layerPrefix, "Put before every layer's name, e.g. ViewLayer")
       ->type_name("NAME");
   command.add_flag("--reproducible", o.noTiming, "No run times in the header: identical runs give identical files");
-  showFirst(command, kOutputHelp, {"--output", "--png", "--tone", "--exposure", "--combine", "--aovs"});
+  showFirst(command, kOutputHelp, {"--output", "--png", "--exposure", "--combine", "--aovs"});
 }
 
 void showImages(const Estimates& estimates, const PipelineResult& combined, const std::vector<std::string>& wanted,

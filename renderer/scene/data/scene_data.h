@@ -73,6 +73,8 @@ struct EnvironmentData {
   std::shared_ptr<const Image> image;  // null: the constant `radiance`
   Spectrum radiance{0};                // constant radiance, or the scale of the image
   float rotation = 0;                  // radians about +Y
+  // Radiance of the image that light sampling leaves, but for a twentieth, to the directions that surfaces choose.
+  float base = 0;
 };
 
 // What lights a file that has no light of its own.

@@ -9,7 +9,7 @@ namespace braid {
 namespace {
 
 constexpr int kWidth = 256, kHeight = 128;
-// The brightest of the paper, at the horizon.
+// The brightest of the paper, at the horizon: what is brighter is a box.
 constexpr float kPaper = 0.5f;
 constexpr float kSoftEdge = 0.07f;  // of a box, as a tangent
 
@@ -66,7 +66,7 @@ EnvironmentData studioEnvironment(float meanRadiance) {
     }
   }
   const auto scale = static_cast<float>(static_cast<double>(meanRadiance) * weights / sum);
-  return {image, Spectrum(scale), 0};
+  return {image, Spectrum(scale), 0, kPaper};
 }
 
 }  // namespace braid
