@@ -14,24 +14,29 @@ Camera::CameraRay cameraRayThrough(const Plan& plan, const SampleBlock& camera, 
   return plan.camera.rayFrom(lens, Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) + offset);
 }
 
-bool recordFeatures(const Scene& scene, const SubpathVertex& vertex, int maxDepth, FeatureSample& features) {
-  if (!vertex.bsdf.hasNonDelta() && (vertex.segments < maxDepth || vertex.bsdf.passesStraight())) return false;
-  const Hit& hit = vertex.hit;
-  Spectrum albedo = vertex.bsdf.albedo();
+void surfaceFeatures(const Scene& scene, const Hit& hit, const Bsdf& bsdf, float distance, FeatureSample& features) {
+  Spectrum albedo = bsdf.albedo();
   if (hit.material->emissive()) albedo += scene.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
   features.setAlbedo(albedo);
   features.normal = hit.frame.n;
-  features.depth = vertex.travelled;
+  features.depth = distance;
+}
+
+void unlitFeatures(const Spectrum& color, const Hit& hit, float distance, FeatureSample& features) {
+  features.setAlbedo(color);
+  features.normal = hit.frame.n;
+  features.depth = distance;
+}
+
+bool recordFeatures(const Scene& scene, const SubpathVertex& vertex, int maxDepth, FeatureSample& features) {
+  if (!vertex.bsdf.hasNonDelta() && (vertex.segments < maxDepth || vertex.bsdf.passesStraight())) return false;
+  surfaceFeatures(scene, vertex.hit, vertex.bsdf, vertex.travelled, features);
   return true;
 }
 
 Spectrum unlitColor(const Scene& scene, const SubpathVertex& vertex, bool record, FeatureSample& features) {
   const Spectrum color = baseColorAt(scene, vertex.hit);
-  if (record) {
-    features.setAlbedo(color);
-    features.normal = vertex.hit.frame.n;
-    features.depth = vertex.travelled;
-  }
+  if (record) unlitFeatures(color, vertex.hit, vertex.travelled, features);
   return color;
 }
 

@@ -15,6 +15,10 @@ namespace braid {
 // block 0 of the sample's random numbers.
 Camera::CameraRay cameraRayThrough(const Plan& plan, const SampleBlock& camera, int x, int y);
 
+// The features of a surface seen after `distance` metres: the one place that fills them, but for visibility.
+void surfaceFeatures(const Scene& scene, const Hit& hit, const Bsdf& bsdf, float distance, FeatureSample& features);
+void unlitFeatures(const Spectrum& color, const Hit& hit, float distance, FeatureSample& features);
+
 // Records a vertex as the first that is not specular, or as the last of its path; false when it is neither.
 bool recordFeatures(const Scene& scene, const SubpathVertex& vertex, int maxDepth, FeatureSample& features);
 

@@ -74,20 +74,14 @@ void PathKernel::addUnlit(PathState& path, const Hit& hit, PathSample& sample) c
   if (path.lightCouldNotBeSampled) add(path.throughput * color, path.bounces <= 1, sample);
   if (!wantFeatures_ || path.featuresDone) return;
   path.featuresDone = true;
-  sample.features.setAlbedo(color);
-  sample.features.normal = hit.frame.n;
-  sample.features.depth = path.featureDistance + hit.distance;
+  unlitFeatures(color, hit, path.featureDistance + hit.distance, sample.features);
 }
 
 void PathKernel::recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsdf, PathSample& sample) const {
   path.featureDistance += hit.distance;
   if (!bsdf.hasNonDelta() && (path.segments < plan_.settings.maxDepth || bsdf.passesStraight())) return;
   path.featuresDone = true;
-  Spectrum albedo = bsdf.albedo();
-  if (hit.material->emissive()) albedo += scene_.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
-  sample.features.setAlbedo(albedo);
-  sample.features.normal = hit.frame.n;
-  sample.features.depth = path.featureDistance;
+  surfaceFeatures(scene_, hit, bsdf, path.featureDistance, sample.features);
 }
 
 bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided,

@@ -188,15 +188,15 @@ Estimates normalised(const Estimates& all, double k, SanitiseReport& report, con
   if (planes.reference) out.reference = changed(all.reference, colours(k), report);
   if (!all.features || !read.features) return out;
   Features& features = out.features.emplace();
-  features.albedo = changed(all.features->albedo, read.featureNoise, report);
-  features.normal = changed(all.features->normal, read.featureNoise, report);
-  features.depth = changed(all.features->depth, read.featureNoise, report);
-  features.visibility = changed(all.features->visibility, read.featureNoise, report);
+  forEachFeature(*all.features, features,
+                 [&](const auto& from, auto& to) { to = changed(from, read.featureNoise, report); });
   return out;
 }
 
 bool isSane(const Features& f, bool noise) {
-  return isSane(f.albedo, noise) && isSane(f.normal, noise) && isSane(f.depth, noise) && isSane(f.visibility, noise);
+  bool sane = true;
+  forEachFeature(f, [&](const auto& planes) { sane = sane && isSane(planes, noise); });
+  return sane;
 }
 
 void undoExposure(MethodResult& result, double k) {

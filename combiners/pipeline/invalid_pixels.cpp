@@ -169,10 +169,7 @@ uint64_t fillInvalid(Estimates& all) {
     }
   filled += fillInvalid(all.reference);
   if (!all.features) return filled;
-  fillFeatures(all.features->albedo);
-  fillFeatures(all.features->normal);
-  fillFeatures(all.features->depth);
-  fillFeatures(all.features->visibility);
+  forEachFeature(*all.features, [](auto& planes) { fillFeatures(planes); });
   return filled;
 }
 

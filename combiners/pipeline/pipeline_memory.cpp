@@ -10,8 +10,7 @@ namespace braid {
 namespace {
 
 constexpr int kColour = 3 * sizeof(float);
-constexpr int kHalfEstimate = 4 * kColour;         // mean, variance, two halves
-constexpr int kFeatureComponents = 3 + 3 + 1 + 1;  // albedo, normal, depth, visibility
+constexpr int kHalfEstimate = 4 * kColour;  // mean, variance, two halves
 
 int imagesOf(const AvailableEstimate& e) {
   int bytes = kColour;
@@ -66,7 +65,7 @@ int colourMemory(const AvailableEstimates& available) {
 }
 
 // With the mean, two halves and the variance.
-constexpr int kFeatureMemory = 4 * kFeatureComponents * static_cast<int>(sizeof(float));
+constexpr int kFeatureMemory = 4 * static_cast<int>(kFeatureComponents * sizeof(float));
 
 AvailableEstimates copiedAvailable(AvailableEstimates available, const PlanesRead& planes) {
   const KeptBuffers& read = planes.buffers;

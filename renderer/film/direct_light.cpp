@@ -11,14 +11,6 @@ namespace braid {
 DirectLightAccumulator::DirectLightAccumulator(int width, int height, int buckets)
     : direct_(width, height, buckets), indirectSumsq_(width, height) {}
 
-DirectLightAccumulator DirectLightAccumulator::fromSums(Accumulator direct, Rgb<double> indirectSumOfSquares) {
-  BRAID_ASSERT(direct.width() == indirectSumOfSquares.width() && direct.height() == indirectSumOfSquares.height());
-  DirectLightAccumulator parts(0, 0, direct.bucketCount());
-  parts.direct_ = std::move(direct);
-  parts.indirectSumsq_ = std::move(indirectSumOfSquares);
-  return parts;
-}
-
 void DirectLightAccumulator::commit(uint64_t pass, const PassTarget& target) {
   BRAID_ASSERT(target.wantsDirect());  // its splats, if any, are those of other integrators
   direct_.commit(pass, target.direct_);
@@ -46,14 +38,6 @@ Rgb<float> DirectLightAccumulator::indirectVariance(const Accumulator& whole, bo
       });
   }
   return Accumulator::fromSums(std::move(sums), indirectSumsq_, std::move(counts), 0, 0).variance(lowDiscrepancy);
-}
-
-void DirectLightAccumulator::add(const DirectLightAccumulator& other) {
-  direct_.add(other.direct_);
-  for (size_t c = 0; c < 3; ++c)
-    parallelChunks(indirectSumsq_.size(), kPixelChunk, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) indirectSumsq_[c][i] += other.indirectSumsq_[c][i];
-    });
 }
 
 }  // namespace braid

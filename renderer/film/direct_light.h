@@ -20,12 +20,12 @@ class DirectLightAccumulator {
   // Of the mean of the rest; `whole` holds the same passes.
   Rgb<float> indirectVariance(const Accumulator& whole, bool lowDiscrepancy) const;
 
-  // Raw sums, for state files: what a file holds, and back.
+  // For state files: what a file holds, and back.
+  void listSums(const std::string& name, RawSums& list);
+  void setCounts(std::vector<uint64_t> counts) { direct_.setCounts(std::move(counts), 0, 0); }
   const Accumulator& direct() const { return direct_; }
   const Rgb<double>& indirectSumOfSquares() const { return indirectSumsq_; }
-  static DirectLightAccumulator fromSums(Accumulator direct, Rgb<double> indirectSumOfSquares);
-  // Adds the sums of other passes, of the same size and buckets.
-  void add(const DirectLightAccumulator& other);
+  void addCounts(const DirectLightAccumulator& other) { direct_.addCounts(other.direct_); }
 
  private:
   Accumulator direct_;

@@ -57,17 +57,6 @@ struct Checkpoint {
   Rgb<float> mean{}, half[2]{};
 };
 
-// Mean, halves and variance of the mean of one set of feature planes.
-template <class P>
-struct FeaturePlanes {
-  P mean, half[2], variance;
-};
-
-struct Features {
-  FeaturePlanes<Rgb<float>> albedo, normal;
-  FeaturePlanes<Plane<float>> depth, visibility;
-};
-
 // Of which image the estimates are.
 struct EstimatesHead {
   int width = 0, height = 0;  // of the planes: the window

@@ -25,26 +25,9 @@ Plane<float> ratio(const Plane<double>& a, const Plane<double>* b, uint64_t n) {
 }  // namespace
 
 FeatureAccumulator::FeatureAccumulator(int width, int height)
-    : sum_{Planes(FeatureSample::kComponents, Plane<double>(width, height)),
-           Planes(FeatureSample::kComponents, Plane<double>(width, height))},
-      sumsq_(FeatureSample::kComponents, Plane<double>(width, height)) {}
-
-FeatureAccumulator FeatureAccumulator::fromSums(Planes sumsA, Planes sumsB, Planes sumsOfSquares, uint64_t passesA,
-                                                uint64_t passesB) {
-  BRAID_ASSERT(sumsOfSquares.size() == FeatureSample::kComponents);
-  for (const Planes* planes : {&sumsA, &sumsB, &sumsOfSquares}) {
-    BRAID_ASSERT(planes->size() == sumsOfSquares.size());
-    for (const Plane<double>& p : *planes)
-      BRAID_ASSERT(p.width == sumsOfSquares[0].width && p.height == sumsOfSquares[0].height);
-  }
-  FeatureAccumulator f(0, 0);
-  f.sum_[0] = std::move(sumsA);
-  f.sum_[1] = std::move(sumsB);
-  f.sumsq_ = std::move(sumsOfSquares);
-  f.count_[0] = passesA;
-  f.count_[1] = passesB;
-  return f;
-}
+    : sum_{Planes(kFeatureComponents, Plane<double>(width, height)),
+           Planes(kFeatureComponents, Plane<double>(width, height))},
+      sumsq_(kFeatureComponents, Plane<double>(width, height)) {}
 
 void FeatureAccumulator::commit(uint64_t pass, const PassTarget& target) {
   BRAID_ASSERT(target.wantsFeatures() && target.width_ == sumsq_[0].width && target.height_ == sumsq_[0].height);
@@ -52,7 +35,7 @@ void FeatureAccumulator::commit(uint64_t pass, const PassTarget& target) {
   const auto width = static_cast<size_t>(target.width_);
   parallelRows(target.height_, [&](int y) {
     const size_t begin = static_cast<size_t>(y) * width;
-    for (size_t c = 0; c < FeatureSample::kComponents; ++c) {
+    for (size_t c = 0; c < kFeatureComponents; ++c) {
       const float* __restrict in = target.features_[c].data.data() + begin;
       double* __restrict sum = sum_[half][c].data.data() + begin;
       double* __restrict sumsq = sumsq_[c].data.data() + begin;

@@ -44,10 +44,9 @@ void commitRow(const float* __restrict own, const int64_t* __restrict splats, do
 }  // namespace
 
 Accumulator::Accumulator(int width, int height, int buckets, bool bias)
-    : width_(width),
-      height_(height),
-      sum_(static_cast<size_t>(buckets), Rgb<double>(width, height)),
+    : sum_(static_cast<size_t>(buckets), Rgb<double>(width, height)),
       sumsq_(width, height),
+      keepsBias_(bias),
       count_(static_cast<size_t>(buckets), 0) {
   BRAID_ASSERT(buckets >= 2 && buckets % 2 == 0);
   if (bias) biasSum_[0] = biasSum_[1] = biasSumsq_ = Rgb<double>(width, height);
@@ -59,23 +58,19 @@ Accumulator Accumulator::fromSums(std::vector<Rgb<double>> sums, Rgb<double> sum
   BRAID_ASSERT(counts.size() == sums.size());
   for (const Rgb<double>& s : sums)
     BRAID_ASSERT(s.width() == sumOfSquares.width() && s.height() == sumOfSquares.height());
-  a.width_ = sumOfSquares.width();
-  a.height_ = sumOfSquares.height();
   a.sum_ = std::move(sums);
   a.sumsq_ = std::move(sumOfSquares);
-  a.count_ = std::move(counts);
-  a.rejected_ = rejected;
-  a.clampedSplats_ = clampedSplats;
+  a.setCounts(std::move(counts), rejected, clampedSplats);
   return a;
 }
 
 void Accumulator::commit(uint64_t pass, const PassTarget& target) {
-  BRAID_ASSERT(target.width_ == width_ && target.height_ == height_);
+  BRAID_ASSERT(target.width_ == width() && target.height_ == height());
   const size_t bucket = pass % count_.size();
   Rgb<double>& sum = sum_[bucket];
-  const auto width = static_cast<size_t>(width_);
+  const auto width = static_cast<size_t>(sumsq_.width());
   const double unit = 1 / target.splatScale_;
-  parallelRows(height_, [&](int y) {
+  parallelRows(height(), [&](int y) {
     const size_t begin = static_cast<size_t>(y) * width;
     for (size_t c = 0; c < 3; ++c) {
       const float* own = target.own_[c].data.data() + begin;
@@ -94,10 +89,10 @@ void Accumulator::commit(uint64_t pass, const PassTarget& target) {
 }
 
 void Accumulator::commit(uint64_t pass, const Rgb<float>& values) {
-  BRAID_ASSERT(values.width() == width_ && values.height() == height_);
+  BRAID_ASSERT(values.width() == width() && values.height() == height());
   const size_t bucket = pass % count_.size();
-  const auto width = static_cast<size_t>(width_);
-  parallelRows(height_, [&](int y) {
+  const auto width = static_cast<size_t>(sumsq_.width());
+  parallelRows(height(), [&](int y) {
     const size_t begin = static_cast<size_t>(y) * width;
     for (size_t c = 0; c < 3; ++c)
       commitRow(values[c].data.data() + begin, sum_[bucket][c].data.data() + begin, sumsq_[c].data.data() + begin,
@@ -108,21 +103,13 @@ void Accumulator::commit(uint64_t pass, const Rgb<float>& values) {
 
 void Accumulator::commitBias(int half, const PassTarget& target) {
   BRAID_ASSERT(target.wantsBias());
-  const auto width = static_cast<size_t>(width_);
-  parallelRows(height_, [&](int y) {
+  const auto width = static_cast<size_t>(sumsq_.width());
+  parallelRows(height(), [&](int y) {
     const size_t begin = static_cast<size_t>(y) * width;
     for (size_t c = 0; c < 3; ++c)
       commitRow(target.bias_[c].data.data() + begin, biasSum_[half][c].data.data() + begin,
                 biasSumsq_[c].data.data() + begin, width);
   });
-}
-
-void Accumulator::setBiasSums(Rgb<double> ofA, Rgb<double> ofB, Rgb<double> sumOfSquares) {
-  for (const Rgb<double>* plane : {&ofA, &ofB, &sumOfSquares})
-    BRAID_ASSERT(plane->width() == width_ && plane->height() == height_);
-  biasSum_[0] = std::move(ofA);
-  biasSum_[1] = std::move(ofB);
-  biasSumsq_ = std::move(sumOfSquares);
 }
 
 Rgb<float> Accumulator::biasMean() const {
@@ -171,10 +158,10 @@ Rgb<float> Accumulator::meanOfBuckets(int first, int step) const {
     n += count_[k];
     used.push_back(&sum_[k]);
   }
-  Rgb<float> out(width_, height_);
+  Rgb<float> out(width(), height());
   if (n == 0) return out;
-  const auto width = static_cast<size_t>(width_);
-  parallelRows(height_, [&](int y) {
+  const auto width = static_cast<size_t>(sumsq_.width());
+  parallelRows(height(), [&](int y) {
     const size_t begin = static_cast<size_t>(y) * width;
     for (size_t c = 0; c < 3; ++c)
       for (size_t i = begin; i < begin + width; ++i) {
@@ -191,10 +178,10 @@ Rgb<float> Accumulator::bucketMean(int k) const { return meanOfBuckets(k, bucket
 Rgb<float> Accumulator::halfMean(int half) const { return meanOfBuckets(half, 2); }
 
 Rgb<float> Accumulator::passVariance() const {
-  Rgb<float> out(width_, height_);
+  Rgb<float> out(width(), height());
   const uint64_t n = passes();
-  const auto width = static_cast<size_t>(width_);
-  parallelRows(height_, [&](int y) {
+  const auto width = static_cast<size_t>(sumsq_.width());
+  parallelRows(height(), [&](int y) {
     const size_t begin = static_cast<size_t>(y) * width;
     for (size_t c = 0; c < 3; ++c)
       for (size_t i = begin; i < begin + width; ++i) {
@@ -216,9 +203,9 @@ Plane<double> Accumulator::bucketVariance(size_t channel) const {
       used.push_back(k);
       n += static_cast<double>(count_[k]);
     }
-  Plane<double> out(width_, height_);
-  const auto width = static_cast<size_t>(width_);
-  parallelRows(height_, [&](int y) {
+  Plane<double> out(width(), height());
+  const auto width = static_cast<size_t>(sumsq_.width());
+  parallelRows(height(), [&](int y) {
     const size_t begin = static_cast<size_t>(y) * width;
     for (size_t i = begin; i < begin + width; ++i) {
       double total = 0, spread = 0;

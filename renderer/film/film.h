@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "renderer/core/plane.h"
+#include "renderer/film/features.h"
+#include "renderer/film/raw_sums.h"
 
 namespace braid {
 
@@ -21,23 +23,13 @@ struct PixelWindow {
   bool operator==(const PixelWindow&) const = default;
 };
 
-// Features of the first non-specular vertex of a camera path (renderer/README.md, Features): 8 components, planes in
-// this order.
-struct FeatureSample {
-  Spectrum albedo{0};
-  Vec3 normal{0};
-  float depth = 0;
-  float visibility = 0;
-  static constexpr int kComponents = 8;
-
-  // What shines is white, however brightly: features do not scale with the light.
-  void setAlbedo(const Spectrum& value) { albedo = glm::clamp(value, Spectrum(0), Spectrum(1)); }
-};
-
 // What a pass writes besides the values of pixels.
 struct PassPlanes {
   bool splats = false, features = false, coverage = false, bias = false;
   bool direct = false;  // direct light by itself
+
+  // Of what a film gets; splats are the integrator's own memory.
+  uint64_t bytesPerPixel() const;
 };
 
 // What an integrator writes during one pass. add() and features() belong to the task that owns the pixel; splat() may
@@ -90,7 +82,7 @@ class PassTarget {
   int width_, height_;
   Rgb<float> own_;
   std::vector<int64_t> splats_;         // 3 per pixel, interleaved; empty when the integrator does not splat
-  std::vector<Plane<float>> features_;  // FeatureSample::kComponents planes, or empty
+  std::vector<Plane<float>> features_;  // kFeatureComponents planes, or empty
   Plane<float> coverage_;               // or empty
   Rgb<float> bias_;                     // or empty
   Rgb<float> direct_;                   // or empty
@@ -110,8 +102,8 @@ class Accumulator {
   // The same of one plane of values a pass.
   void commit(uint64_t pass, const Rgb<float>& values);
 
-  int width() const { return width_; }
-  int height() const { return height_; }
+  int width() const { return sumsq_.width(); }
+  int height() const { return sumsq_.height(); }
   int bucketCount() const { return static_cast<int>(count_.size()); }
   uint64_t passes() const;
   uint64_t passesInBucket(int k) const { return count_[static_cast<size_t>(k)]; }
@@ -129,30 +121,32 @@ class Accumulator {
   Rgb<float> variance(bool lowDiscrepancy) const;
 
   // The mean estimate of the bias, those of the halves, and the variance of the mean; empty when bias is not kept.
-  bool keepsBias() const { return !biasSumsq_.empty(); }
+  bool keepsBias() const { return keepsBias_; }
   Rgb<float> biasMean() const;
   Rgb<float> biasHalfMean(int half) const;
   Rgb<float> biasVariance() const;
 
-  // Raw sums, for state files: what a file holds, and back.
+  // For state files: what a file holds, and back. Sums are called `sum` and the bucket, and `squares`.
+  void listSums(const std::string& sum, const std::string& squares, RawSums& list);
+  void listBias(const std::string& bias, RawSums& list);
+  void setCounts(std::vector<uint64_t> counts, uint64_t rejected, uint64_t clampedSplats);
   const Rgb<double>& biasSum(int half) const { return biasSum_[half]; }
   const Rgb<double>& biasSumOfSquares() const { return biasSumsq_; }
-  void setBiasSums(Rgb<double> ofA, Rgb<double> ofB, Rgb<double> sumOfSquares);
   const std::vector<Rgb<double>>& sums() const { return sum_; }
   const Rgb<double>& sumOfSquares() const { return sumsq_; }
   static Accumulator fromSums(std::vector<Rgb<double>> sums, Rgb<double> sumOfSquares, std::vector<uint64_t> counts,
                               uint64_t rejected, uint64_t clampedSplats);
-  // Adds the sums of other passes, of an accumulator of the same size and buckets.
-  void add(const Accumulator& other);
+  // Of other passes, whose sums are added by addSums().
+  void addCounts(const Accumulator& other);
 
  private:
   Rgb<float> meanOfBuckets(int first, int step) const;
   void commitBias(int half, const PassTarget& target);
   // Variance of the mean from the spread of the bucket means (independent scrambles).
   Plane<double> bucketVariance(size_t channel) const;
-  int width_, height_;
   std::vector<Rgb<double>> sum_;
   Rgb<double> sumsq_;
+  bool keepsBias_;
   Rgb<double> biasSum_[2], biasSumsq_;  // of the halves, and of all passes; or empty
   std::vector<uint64_t> count_;
   uint64_t rejected_ = 0, clampedSplats_ = 0;
@@ -168,13 +162,13 @@ class FeatureAccumulator {
   Plane<float> halfMean(int component, int half) const;
   Plane<float> variance(int component) const;
 
-  // Raw sums, for state files: what a file holds, and back.
+  // For state files: what a file holds, and back.
+  void listSums(const std::string& name, RawSums& list);
+  void setCounts(uint64_t passesA, uint64_t passesB);
   uint64_t passesInHalf(int half) const { return count_[half]; }
   const std::vector<Plane<double>>& sums(int half) const { return sum_[half]; }
   const std::vector<Plane<double>>& sumsOfSquares() const { return sumsq_; }
-  static FeatureAccumulator fromSums(std::vector<Plane<double>> sumsA, std::vector<Plane<double>> sumsB,
-                                     std::vector<Plane<double>> sumsOfSquares, uint64_t passesA, uint64_t passesB);
-  void add(const FeatureAccumulator& other);
+  void addCounts(const FeatureAccumulator& other);
 
  private:
   std::vector<Plane<double>> sum_[2];  // per half, per component
@@ -190,10 +184,11 @@ class CoverageAccumulator {
   uint64_t passes() const { return count_; }
   Plane<float> mean() const;
 
-  // Raw sums, for state files: what a file holds, and back.
+  // For state files: what a file holds, and back.
   const Plane<double>& sums() const { return sum_; }
-  static CoverageAccumulator fromSums(Plane<double> sums, uint64_t passes);
-  void add(const CoverageAccumulator& other);
+  void listSums(const std::string& name, RawSums& list) { list.push_back({name, &sum_}); }
+  void setCount(uint64_t passes) { count_ = passes; }
+  void addCount(const CoverageAccumulator& other) { count_ += other.count_; }
 
  private:
   Plane<double> sum_;

@@ -9,30 +9,22 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
+#include "renderer/film/planes.h"
 
 namespace braid {
 
 namespace {
 
-template <class P, class Get>
-FeaturePlanes<P> featurePlanes(const Get& get) {
-  return {get([](const FeatureAccumulator& a, int c) { return a.mean(c); }),
-          {get([](const FeatureAccumulator& a, int c) { return a.halfMean(c, 0); }),
-           get([](const FeatureAccumulator& a, int c) { return a.halfMean(c, 1); })},
-          get([](const FeatureAccumulator& a, int c) { return a.variance(c); })};
-}
-
 Features collectFeatures(const FeatureAccumulator& a) {
-  const auto rgb = [&](int first) {
-    return [&a, first](auto plane) {
-      Rgb<float> planes;
-      for (int c = 0; c < 3; ++c) planes[static_cast<size_t>(c)] = plane(a, first + c);
-      return planes;
-    };
-  };
-  const auto single = [&](int component) { return [&a, component](auto plane) { return plane(a, component); }; };
-  return {featurePlanes<Rgb<float>>(rgb(0)), featurePlanes<Rgb<float>>(rgb(3)), featurePlanes<Plane<float>>(single(6)),
-          featurePlanes<Plane<float>>(single(7))};
+  Features features;
+  int component = 0;
+  for (size_t f = 0; f < kFeaturePlanes.size(); ++f)
+    for (size_t c = 0; c < kFeaturePlanes[f].components.size(); ++c, ++component) {
+      featurePlane(features, f, 0, c) = a.mean(component);
+      for (int h = 0; h < 2; ++h) featurePlane(features, f, static_cast<size_t>(h) + 1, c) = a.halfMean(component, h);
+      featurePlane(features, f, 3, c) = a.variance(component);
+    }
+  return features;
 }
 
 Estimate estimateOf(const EstimateState& state, bool quarters) {
@@ -87,7 +79,32 @@ void normalise(std::vector<PassInterval>& list) {
   list = std::move(joined);
 }
 
+// Reads only.
+RawSums sumsOf(const EstimateState& e) { return const_cast<EstimateState&>(e).rawSums(); }
+RawSums sumsOf(const FilmState& s) { return const_cast<FilmState&>(s).sharedSums(); }
+
+bool sameNames(const RawSums& a, const RawSums& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const RawSum& x, const RawSum& y) {
+    return x.name == y.name && x.plane->width == y.plane->width && x.plane->height == y.plane->height;
+  });
+}
+
 }  // namespace
+
+RawSums EstimateState::rawSums() {
+  RawSums list;
+  sums.listSums(name + ".sum", name + ".squares", list);
+  sums.listBias(name + ".bias", list);
+  if (parts) parts->listSums(name + '.', list);
+  return list;
+}
+
+RawSums FilmState::sharedSums() {
+  RawSums list;
+  if (features) features->listSums("features.", list);
+  if (coverage) coverage->listSums("coverage", list);
+  return list;
+}
 
 void EstimateState::addPass(uint64_t pass) {
   BRAID_ASSERT(passes.empty() || pass >= passes.back().end);
@@ -186,24 +203,28 @@ std::string overlap(const FilmState& a, const FilmState& b) {
   return {};
 }
 
+bool holdSameSums(const FilmState& a, const FilmState& b) {
+  return a.window == b.window && sameNames(sumsOf(a), sumsOf(b)) &&
+         std::equal(a.estimates.begin(), a.estimates.end(), b.estimates.begin(), b.estimates.end(),
+                    [](const EstimateState& x, const EstimateState& y) { return sameNames(sumsOf(x), sumsOf(y)); });
+}
+
 void addShare(FilmState& state, const FilmState& next) {
-  BRAID_ASSERT(state.estimates.size() == next.estimates.size() && state.buckets == next.buckets &&
-               state.window == next.window && state.features.has_value() == next.features.has_value() &&
-               state.coverage.has_value() == next.coverage.has_value());
+  BRAID_ASSERT(holdSameSums(state, next));
   for (size_t i = 0; i < state.estimates.size(); ++i) {
     EstimateState& e = state.estimates[i];
     const EstimateState& n = next.estimates[i];
-    BRAID_ASSERT(e.name == n.name);
     if (!e.history.empty() && e.history.back().passes < e.sums.passes()) e.keepCheckpoint(stopsOf(state.identity));
-    BRAID_ASSERT(e.parts.has_value() == n.parts.has_value());
-    e.sums.add(n.sums);
-    if (e.parts) e.parts->add(*n.parts);
+    addSums(e.rawSums(), sumsOf(n));
+    e.sums.addCounts(n.sums);
+    if (e.parts) e.parts->addCounts(*n.parts);
     e.seconds += n.seconds;
     e.passes.insert(e.passes.end(), n.passes.begin(), n.passes.end());
     normalise(e.passes);
   }
-  if (state.features) state.features->add(*next.features);
-  if (state.coverage) state.coverage->add(*next.coverage);
+  addSums(state.sharedSums(), sumsOf(next));
+  if (state.features) state.features->addCounts(*next.features);
+  if (state.coverage) state.coverage->addCount(*next.coverage);
   state.seconds += next.seconds;
 }
 

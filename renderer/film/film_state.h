@@ -37,6 +37,8 @@ struct EstimateState {
 
   uint64_t firstPass() const { return passes.empty() ? 0 : passes.front().begin; }
   uint64_t endPass() const { return passes.empty() ? 0 : passes.back().end; }
+  // What state files hold of it besides the history.
+  RawSums rawSums();
   // Notes that `pass`, not before endPass(), is among the sums.
   void addPass(uint64_t pass);
   // Adds the present variance to the history; and the image, if it is the first in the history of at least one of
@@ -75,6 +77,8 @@ struct FilmState {
   std::optional<CoverageAccumulator> coverage;  // with a transparent background
   std::vector<Attribute> attributes;            // of image headers, as far as they do not depend on the passes
 
+  // What does not depend on the integrator: features and coverage.
+  RawSums sharedSums();
   // Rounds whose passes are all done.
   uint64_t rounds() const;
   uint64_t rejected() const;
@@ -90,10 +94,13 @@ std::string difference(const StateIdentity& there, const StateIdentity& here, bo
 // The first pass interval that both hold, as a sentence, or empty.
 std::string overlap(const FilmState& a, const FilmState& b);
 
+// Whether both hold sums of the same estimates, of the same names and of one window.
+bool holdSameSums(const FilmState& a, const FilmState& b);
+
 // Adds the passes of a later share to those of an earlier one: identities equal (difference() empty), passes disjoint
-// (overlap() empty), `next` begins behind `state`. Histories do not add up: that of `state` stays, and grows by the
-// point before this addition, if there is a history at all; where denoising is to stop, the image is that of the first
-// shares that have passes enough.
+// (overlap() empty), the same sums, and `next` begins behind `state`. Histories do not add up: that of `state` stays,
+// and grows by the point before this addition, if there is a history at all; where denoising is to stop, the image is
+// that of the first shares that have passes enough.
 void addShare(FilmState& state, const FilmState& next);
 
 }  // namespace braid

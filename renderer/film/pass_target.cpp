@@ -17,10 +17,15 @@ bool acceptable(const Spectrum& v) {
 
 }  // namespace
 
+uint64_t PassPlanes::bytesPerPixel() const {
+  const size_t colours = 1 + static_cast<size_t>(bias) + static_cast<size_t>(direct);
+  return sizeof(float) * (3 * colours + (features ? kFeatureComponents : 0) + (coverage ? 1 : 0));
+}
+
 PassTarget::PassTarget(int width, int height, const PassPlanes& planes)
     : width_(width), height_(height), own_(width, height) {
   if (planes.splats) splats_.assign(3 * own_.size(), 0);
-  if (planes.features) features_.assign(FeatureSample::kComponents, Plane<float>(width, height));
+  if (planes.features) features_.assign(kFeatureComponents, Plane<float>(width, height));
   if (planes.coverage) coverage_ = Plane<float>(width, height);
   if (planes.bias) bias_ = Rgb<float>(width, height);
   if (planes.direct) direct_ = Rgb<float>(width, height);
@@ -67,12 +72,10 @@ void PassTarget::setSplatFractionBits(int bits) {
 
 void PassTarget::features(int x, int y, const FeatureSample& sample) {
   const size_t i = own_[0].index(x, y);
-  const float values[FeatureSample::kComponents] = {sample.albedo.x, sample.albedo.y,  sample.albedo.z,
-                                                    sample.normal.x, sample.normal.y,  sample.normal.z,
-                                                    sample.depth,    sample.visibility};
+  const auto values = sample.values();
   // A non-finite component would poison every window around it: it counts as 0, and the sample as rejected.
   bool ok = true;
-  for (size_t c = 0; c < FeatureSample::kComponents; ++c) {
+  for (size_t c = 0; c < kFeatureComponents; ++c) {
     const bool finite = std::isfinite(values[c]);
     ok &= finite;
     features_[c][i] = finite ? values[c] : 0.0f;

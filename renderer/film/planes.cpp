@@ -37,6 +37,9 @@ P& partOf(FeaturePlanes<P>& f, size_t part) {
   return part == 0 ? f.mean : part == 3 ? f.variance : f.half[part - 1];
 }
 
+Plane<float>& componentOf(Plane<float>& plane, size_t) { return plane; }
+Plane<float>& componentOf(Rgb<float>& planes, size_t c) { return planes[c]; }
+
 }  // namespace
 
 std::span<const EstimatePlane> estimatePlanes() { return kEstimatePlanes; }
@@ -47,16 +50,12 @@ std::span<const HistoryPlane> historyPlanes() { return kHistoryPlanes; }
 
 Plane<float>& featurePlane(Features& features, size_t feature, size_t part, size_t c) {
   BRAID_ASSERT(feature < kFeaturePlanes.size() && part < kFeatureParts.size());
-  switch (feature) {
-    case 0:
-      return partOf(features.albedo, part)[c];
-    case 1:
-      return partOf(features.normal, part)[c];
-    case 2:
-      return partOf(features.visibility, part);
-    default:
-      return partOf(features.depth, part);
-  }
+  Plane<float>* found = nullptr;
+  size_t index = 0;
+  forEachFeature(features, [&](auto& planes) {
+    if (index++ == feature) found = &componentOf(partOf(planes, part), c);
+  });
+  return *found;
 }
 
 const Plane<float>& featurePlane(const Features& features, size_t feature, size_t part, size_t c) {

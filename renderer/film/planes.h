@@ -34,17 +34,7 @@ struct HistoryPlane {
 };
 std::span<const HistoryPlane> historyPlanes();
 
-// A feature. Its layers are "<name>" and, for halves and the variance of the mean, "<name>A", "<name>B" and
-// "<name>Variance", with one channel a component.
-struct FeaturePlane {
-  const char* name;
-  const char* components;  // a letter each: RGB, XYZ, Z or V
-  bool anySize;            // such as metres: half floats would not hold it
-};
-inline constexpr std::array kFeaturePlanes = {FeaturePlane{"Albedo", "RGB", false}, FeaturePlane{"N", "XYZ", false},
-                                              FeaturePlane{"Visibility", "V", false}, FeaturePlane{"Depth", "Z", true}};
-
-// The parts of a feature in the order in which files hold them, with what follows the feature's name.
+// The parts of a feature in the order in which files hold them, with what follows the feature's layer.
 inline constexpr std::array kFeatureParts = {"", "A", "B", "Variance"};
 
 // The plane of component c of a part of a feature, both by their place in the tables above.

@@ -8,6 +8,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
+#include "renderer/session/film_of_plan.h"
 #include "renderer/session/integrator.h"
 #include "renderer/session/pixel_filter.h"
 
@@ -151,43 +152,41 @@ void planView(const Scene& scene, Plan& plan) {
          fmt::format("{:.4g} m wide, sharp at {:.4g} m", 2 * camera.lensRadius(), camera.focusDistance())});
 }
 
+bool anySeparatesDirectLight(const Plan& plan) {
+  return std::any_of(plan.integrators.begin(), plan.integrators.end(),
+                     [](const auto& p) { return p.integrator->separatesDirectLight(); });
+}
+
 // What the film keeps, and what a pixel of it takes.
 void planBuffers(Plan& plan) {
   const Settings& settings = plan.settings;
-  const auto separate = std::count_if(plan.integrators.begin(), plan.integrators.end(),
-                                      [](const auto& p) { return p.integrator->separatesDirectLight(); });
+  const bool separable = anySeparatesDirectLight(plan);
   KeptBuffers& kept = plan.kept;
   kept = settings.keep;
   kept.quarters |= settings.full;
   kept.features |= settings.full;
   kept.featureNoise = kept.features;
-  kept.directIndirect = separate > 0 && (kept.directIndirect || settings.full);
+  kept.directIndirect = separable && (kept.directIndirect || settings.full);
 
-  const uint64_t accumulator = kept.quarters ? 120 : 72;
-  plan.filmBytesPerPixel = accumulator * plan.integrators.size() + 12;
-  if (kept.features) plan.filmBytesPerPixel += FeatureSample::kComponents * (3 * 8 + 4);
-  if (settings.transparent) plan.filmBytesPerPixel += 12;
-  bool bias = false;
-  for (const PlannedIntegrator& p : plan.integrators) {
-    if (!p.integrator->estimatesBias()) continue;
-    plan.filmBytesPerPixel += 72 + (bias ? 0 : 12);
-    bias = true;
-  }
-  if (kept.directIndirect) plan.filmBytesPerPixel += (accumulator + 24) * static_cast<uint64_t>(separate) + 12;
+  plan.filmBytesPerPixel = filmBytesPerPixel(plan);
+}
+
+std::string featureNames() {
+  std::string names;
+  for (const FeaturePlane& f : kFeaturePlanes) names += fmt::format("{}{}", names.empty() ? "" : ", ", f.name);
+  return names;
 }
 
 void listBuffers(Plan& plan) {
   const KeptBuffers& kept = plan.kept;
-  const bool separable = std::any_of(plan.integrators.begin(), plan.integrators.end(),
-                                     [](const auto& p) { return p.integrator->separatesDirectLight(); });
+  const bool separable = anySeparatesDirectLight(plan);
   const auto line = [&](bool isKept, const char* subject, const std::string& reason) {
     plan.lines.push_back({isKept, subject, reason});
   };
   line(kept.quarters, "quarter buckets",
        kept.quarters ? "for outputs or combiners" : "no output or combiner reads quarters: two half buffers");
   line(kept.features, "features",
-       kept.features ? "albedo, normal, depth, visibility for outputs or combiners"
-                     : "no output or combiner reads them");
+       kept.features ? featureNames() + " for outputs or combiners" : "no output or combiner reads them");
   line(kept.directIndirect, "direct light by itself",
        kept.directIndirect ? "for outputs or combiners"
        : separable         ? "no output or combiner reads it"

@@ -9,6 +9,7 @@
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 #include "renderer/core/stopwatch.h"
+#include "renderer/session/film_of_plan.h"
 #include "renderer/session/pixel_options.h"
 
 namespace braid {
@@ -16,20 +17,6 @@ namespace braid {
 namespace {
 
 bool isSet(const std::atomic<bool>* flag) { return flag && flag->load(); }
-
-PassTarget makeTarget(const Plan& plan) {
-  bool splats = false, bias = false;
-  for (const PlannedIntegrator& p : plan.integrators) {
-    splats = splats || p.integrator->splats();
-    bias = bias || p.integrator->estimatesBias();
-  }
-  return PassTarget(plan.window.width(), plan.window.height(),
-                    {.splats = splats,
-                     .features = plan.kept.features,
-                     .coverage = plan.settings.transparent,
-                     .bias = bias,
-                     .direct = plan.kept.directIndirect});
-}
 
 }  // namespace
 
@@ -57,7 +44,7 @@ class Session::Loop {
         abandon_(abandon),
         statistics_(statistics),
         result_(result),
-        target_(makeTarget(session.plan_)),
+        target_(session.plan_.window.width(), session.plan_.window.height(), passPlanes(session.plan_)),
         startSeconds_(session.film_.seconds) {
     result_.rounds = result_.firstRound = film_.rounds();
     preparations_.resize(plan_.integrators.size());
@@ -158,7 +145,7 @@ class Session::Loop {
 Session::Session(const Scene& scene, Plan plan)
     : scene_(scene), plan_(std::move(plan)), context_(scene, plan_.settings.lightStrategy) {
   if (plan_.integrators.empty()) throw Error(ExitCode::Usage, "no integrator to run: name one with --integrator");
-  const int width = plan_.window.width(), height = plan_.window.height();
+  film_ = emptyFilm(plan_, plan_.window.width(), plan_.window.height());
   film_.identity.isa = scene.accel().isa();
   film_.identity.sceneHash = scene.data().contentHash;
   film_.identity.options = pixelOptions(plan_);
@@ -166,21 +153,6 @@ Session::Session(const Scene& scene, Plan plan)
   film_.window = plan_.window;
   film_.fullWidth = plan_.settings.width;
   film_.fullHeight = plan_.settings.height;
-  film_.buckets = plan_.buckets();
-  for (const PlannedIntegrator& p : plan_.integrators) {
-    EstimateState e;
-    e.name = p.integrator->name();
-    e.unbiased = p.integrator->unbiased();
-    e.correlation = p.integrator->correlation();
-    e.lowDiscrepancy = p.integrator->lowDiscrepancy(plan_.settings);
-    e.passesPerRound = p.passesPerRound;
-    e.sums = Accumulator(width, height, plan_.buckets(), p.integrator->estimatesBias());
-    if (plan_.kept.directIndirect && p.integrator->separatesDirectLight())
-      e.parts.emplace(width, height, plan_.buckets());
-    film_.estimates.push_back(std::move(e));
-  }
-  if (plan_.kept.features) film_.features.emplace(width, height);
-  if (plan_.settings.transparent) film_.coverage.emplace(width, height);
 }
 
 void Session::identify(const std::string& version, const std::string& build,
@@ -197,15 +169,9 @@ void Session::resume(FilmState state, const std::string& name) {
     throw Error(ExitCode::BadInput,
                 fmt::format("{}: cannot be resumed: {}: render as it was begun, or begin anew", name, differs));
   // Equal options make equal accumulators, unless the file was tampered with.
-  bool fits = state.estimates.size() == film_.estimates.size() && state.window == film_.window &&
-              state.buckets == film_.buckets && state.features.has_value() == film_.features.has_value() &&
-              state.coverage.has_value() == film_.coverage.has_value();
-  for (size_t i = 0; fits && i < film_.estimates.size(); ++i) {
-    const EstimateState &there = state.estimates[i], &here = film_.estimates[i];
-    fits = there.name == here.name && there.passesPerRound == here.passesPerRound &&
-           there.sums.keepsBias() == here.sums.keepsBias() && there.parts.has_value() == here.parts.has_value() &&
-           there.sums.width() == here.sums.width() && there.sums.height() == here.sums.height();
-  }
+  bool fits = holdSameSums(state, film_);
+  for (size_t i = 0; fits && i < film_.estimates.size(); ++i)
+    fits = state.estimates[i].passesPerRound == film_.estimates[i].passesPerRound;
   if (!fits) throw Error(ExitCode::BadInput, name + ": cannot be resumed: what it holds is not what its options say");
   state.attributes = std::move(film_.attributes);
   film_ = std::move(state);

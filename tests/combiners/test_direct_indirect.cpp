@@ -171,7 +171,11 @@ TEST_CASE("Sums of the parts are those of accumulators of their own, also of sha
     direct.commit(pass, d);
     indirect.commit(pass, rest);
   }
-  parts.add(later);
+  RawSums to, from;
+  parts.listSums("", to);
+  later.listSums("", from);
+  addSums(to, from);
+  parts.addCounts(later);
   for (const bool lowDiscrepancy : {false, true}) {
     const DirectLight part = parts.directPart(lowDiscrepancy);
     CHECK(near(part.mean, direct.mean(), 1e-6f));

@@ -168,7 +168,12 @@ TEST_CASE("features: mean, halves and variance") {
   CHECK(film.variance(3).at(1, 0) == 0);
   // Values 0, 10 … 50: variance of one pass 350, of the mean 350 / 6.
   CHECK(film.variance(6).at(1, 0) == doctest::Approx(350.0 / 6));
-  const FeatureAccumulator copy = FeatureAccumulator::fromSums(film.sums(0), film.sums(1), film.sumsOfSquares(), 3, 3);
+  FeatureAccumulator copy(2, 2);
+  RawSums to, from;
+  copy.listSums("", to);
+  film.listSums("", from);
+  addSums(to, from);
+  copy.addCounts(film);
   CHECK(copy.variance(6).at(1, 0) == film.variance(6).at(1, 0));
 
   FeatureSample bad;

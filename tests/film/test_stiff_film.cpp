@@ -108,7 +108,12 @@ Accumulator merged(const Accumulator& parts, int streamCount, int partCount) {
       sums.push_back(cut(parts.sums()[k]));
       counts.push_back(parts.passesInBucket(static_cast<int>(k)));
     }
-    all.add(Accumulator::fromSums(std::move(sums), cut(parts.sumOfSquares()), std::move(counts), 0, 0));
+    Accumulator more = Accumulator::fromSums(std::move(sums), cut(parts.sumOfSquares()), std::move(counts), 0, 0);
+    RawSums to, from;
+    all.listSums("sum", "squares", to);
+    more.listSums("sum", "squares", from);
+    addSums(to, from);
+    all.addCounts(more);
   }
   return all;
 }
@@ -330,7 +335,7 @@ TEST_CASE("Biases, features and coverage of stiff passes stay finite, and consta
   for (const Rgb<float>& image : {film.biasMean(), film.biasHalfMean(0), film.biasHalfMean(1), film.biasVariance()})
     for (size_t c = 0; c < 3; ++c)
       for (const float v : image[c].data) CHECK(std::isfinite(v));
-  for (int k = 0; k < FeatureSample::kComponents; ++k)
+  for (int k = 0; k < static_cast<int>(kFeatureComponents); ++k)
     for (const Plane<float>& plane :
          {features.mean(k), features.halfMean(k, 0), features.halfMean(k, 1), features.variance(k)})
       for (const float v : plane.data) CHECK(std::isfinite(v));

@@ -59,24 +59,15 @@ std::vector<Part> sortedParts(const std::vector<std::string>& files, bool quiet)
   return parts;
 }
 
-// Equal options make states of one kind, unless a file was tampered with.
-void requireOneKind(const FilmState& a, const FilmState& b, const std::string& file) {
-  bool same = a.estimates.size() == b.estimates.size() && a.buckets == b.buckets && a.window == b.window &&
-              a.features.has_value() == b.features.has_value() && a.coverage.has_value() == b.coverage.has_value();
-  for (size_t i = 0; same && i < a.estimates.size(); ++i)
-    same = a.estimates[i].name == b.estimates[i].name &&
-           a.estimates[i].sums.keepsBias() == b.estimates[i].sums.keepsBias() &&
-           a.estimates[i].parts.has_value() == b.estimates[i].parts.has_value();
-  if (!same) throw Error(ExitCode::BadInput, file + ": what it holds is not what its options say: use another copy");
-}
-
 // One part in memory beside the sum. The order of adding is that of the passes, so that bits do not depend on the order
 // on the command line.
 FilmState sumOf(const std::vector<Part>& parts) {
   FilmState sum = readStateFile(parts.front().file);
   for (size_t i = 1; i < parts.size(); ++i) {
     const FilmState next = readStateFile(parts[i].file);
-    requireOneKind(sum, next, parts[i].file);
+    // Equal options make states of one kind, unless a file was tampered with.
+    if (!holdSameSums(sum, next))
+      throw Error(ExitCode::BadInput, parts[i].file + ": what it holds is not what its options say: use another copy");
     addShare(sum, next);
   }
   return sum;

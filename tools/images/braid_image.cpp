@@ -88,8 +88,8 @@ Features readFeatures(const ImageFile& file, const std::string& prefix) {
   Features features;
   for (size_t f = 0; f < kFeaturePlanes.size(); ++f)
     for (size_t part = 0; part < kFeatureParts.size(); ++part) {
-      Rgb<float> planes = layerOrNone(file, prefix + kFeaturePlanes[f].name + kFeatureParts[part]);
-      for (size_t c = 0; kFeaturePlanes[f].components[c] != 0; ++c)
+      Rgb<float> planes = layerOrNone(file, prefix + kFeaturePlanes[f].layer + kFeatureParts[part]);
+      for (size_t c = 0; c < kFeaturePlanes[f].components.size(); ++c)
         featurePlane(features, f, part, c) = std::move(planes[c]);
     }
   return features;

@@ -87,7 +87,7 @@ Estimates enlargedEstimates(const FilmState& coarse, const Plan& plan) {
   if (!from.features) return to;
   to.features.emplace();
   for (size_t f = 0; f < kFeaturePlanes.size(); ++f)
-    for (size_t c = 0; kFeaturePlanes[f].components[c] != 0; ++c)
+    for (size_t c = 0; c < kFeaturePlanes[f].components.size(); ++c)
       featurePlane(*to.features, f, 0, c) = enlarged(featurePlane(std::as_const(*from.features), f, 0, c));
   return to;
 }

@@ -68,10 +68,10 @@ class ChannelList {
 void addFeatures(ChannelList& channels, const Features& features, bool all, bool half) {
   for (size_t f = 0; f < kFeaturePlanes.size(); ++f) {
     channels.setHalf(half && !all && !kFeaturePlanes[f].anySize);
-    const std::string components = kFeaturePlanes[f].components;
+    const std::string_view components = kFeaturePlanes[f].components;
     for (size_t part = 0; part < (all ? kFeatureParts.size() : 1); ++part)
       for (size_t c = 0; c < components.size(); ++c)
-        channels.add(std::string(kFeaturePlanes[f].name) + kFeatureParts[part] + '.' + components[c],
+        channels.add(std::string(kFeaturePlanes[f].layer) + kFeatureParts[part] + '.' + components[c],
                      featurePlane(features, f, part, c));
   }
   channels.setHalf(false);

@@ -24,36 +24,6 @@ constexpr uint64_t kMaxHeader = 16 << 20;
 constexpr size_t kFirstLine = 64;      // at most
 constexpr size_t kChecksumBytes = 17;  // 16 digits and a newline
 
-// Calls visit(values) for every plane, in the order of planeTable(). Planes are those of a state with its sums.
-template <class Visit>
-void forEachPlane(const FilmState& state, const Visit& visit) {
-  const auto colour = [&](const auto& planes) {
-    for (size_t c = 0; c < 3; ++c) visit(planes[c].data);
-  };
-  for (const EstimateState& e : state.estimates) {
-    for (const Rgb<double>& sum : e.sums.sums()) colour(sum);
-    colour(e.sums.sumOfSquares());
-    if (e.sums.keepsBias()) {
-      for (int half = 0; half < 2; ++half) colour(e.sums.biasSum(half));
-      colour(e.sums.biasSumOfSquares());
-    }
-    if (e.parts) {
-      for (const Rgb<double>& sum : e.parts->direct().sums()) colour(sum);
-      colour(e.parts->direct().sumOfSquares());
-      colour(e.parts->indirectSumOfSquares());
-    }
-    for (const Checkpoint& c : e.history)
-      for (const Rgb<float>* image : {&c.variance, &c.mean, &c.half[0], &c.half[1]})
-        if (!image->empty()) colour(*image);
-  }
-  if (state.features) {
-    for (int half = 0; half < 2; ++half)
-      for (const Plane<double>& p : state.features->sums(half)) visit(p.data);
-    for (const Plane<double>& p : state.features->sumsOfSquares()) visit(p.data);
-  }
-  if (state.coverage) visit(state.coverage->sums().data);
-}
-
 // A file that is read from the front, with its size known and everything that was read in a checksum.
 class Reader {
  public:
@@ -105,8 +75,9 @@ class Reader {
   ContentHash hash_;
 };
 
-// Reads the first line and the header; afterwards the size of the file is known to be what the plane table says.
-StateLayout readHeader(Reader& in, const std::string& path, FilmState& state) {
+// Reads the first line and the header; afterwards the size of the file is known to be what the plane table says, which
+// is returned.
+std::vector<PlaneEntry> readHeader(Reader& in, const std::string& path, FilmState& state) {
   unsigned long long headerBytes = 0, planeBytes = 0;
   int format = 0, used = 0;
   const std::string line = in.firstLine();
@@ -124,61 +95,20 @@ StateLayout readHeader(Reader& in, const std::string& path, FilmState& state) {
         fmt::format("has {} bytes instead of {}: it was cut short or damaged: use another copy", in.size(), expected));
   std::string header(headerBytes, '\0');
   in.read(header.data(), header.size());
-  StateLayout layout;
-  parseStateHeader(path, header, state, layout);
+  HistoryImages images;
+  parseStateHeader(path, header, state, images);
+  std::vector<PlaneEntry> table = planeTable(state, images);
   uint64_t bytesOfPixel = 0;
-  for (const PlaneEntry& p : planeTable(state, layout)) bytesOfPixel += p.bytesPerValue;
+  for (const PlaneEntry& p : table) bytesOfPixel += p.bytesPerValue();
   const auto pixels = static_cast<uint64_t>(state.window.width()) * static_cast<uint64_t>(state.window.height());
   if (bytesOfPixel * pixels != planeBytes) in.fail("the planes do not have the size of the image: use another copy");
-  return layout;
+  return table;
 }
 
 template <class T>
-Plane<T> readPlane(Reader& in, const FilmState& state) {
-  Plane<T> plane(state.window.width(), state.window.height());
+void readPlane(Reader& in, const FilmState& state, Plane<T>& plane) {
+  plane = Plane<T>(state.window.width(), state.window.height());
   in.read(plane.data.data(), plane.size() * sizeof(T));
-  return plane;
-}
-
-template <class T>
-Rgb<T> readColour(Reader& in, const FilmState& state) {
-  Rgb<T> planes;
-  for (size_t c = 0; c < 3; ++c) planes[c] = readPlane<T>(in, state);
-  return planes;
-}
-
-Accumulator readSums(Reader& in, const FilmState& state, const EstimateLayout& layout) {
-  std::vector<Rgb<double>> sums;
-  for (int k = 0; k < state.buckets; ++k) sums.push_back(readColour<double>(in, state));
-  Rgb<double> squares = readColour<double>(in, state);
-  return Accumulator::fromSums(std::move(sums), std::move(squares), layout.counts, layout.rejected,
-                               layout.clampedSplats);
-}
-
-void readEstimate(Reader& in, const FilmState& state, const EstimateLayout& layout, EstimateState& e) {
-  e.sums = readSums(in, state, layout);
-  if (layout.bias) {
-    Rgb<double> ofA = readColour<double>(in, state), ofB = readColour<double>(in, state);
-    e.sums.setBiasSums(std::move(ofA), std::move(ofB), readColour<double>(in, state));
-  }
-  if (layout.parts) {
-    Accumulator direct = readSums(in, state, layout);
-    e.parts = DirectLightAccumulator::fromSums(std::move(direct), readColour<double>(in, state));
-  }
-  for (size_t k = 0; k < e.history.size(); ++k) {
-    Checkpoint& c = e.history[k];
-    c.variance = readColour<float>(in, state);
-    if (!layout.images[k]) continue;
-    for (Rgb<float>* image : {&c.mean, &c.half[0], &c.half[1]}) *image = readColour<float>(in, state);
-  }
-}
-
-FeatureAccumulator readFeatures(Reader& in, const FilmState& state, const StateLayout& layout) {
-  std::vector<Plane<double>> parts[3];
-  for (auto& part : parts)
-    for (int c = 0; c < FeatureSample::kComponents; ++c) part.push_back(readPlane<double>(in, state));
-  return FeatureAccumulator::fromSums(std::move(parts[0]), std::move(parts[1]), std::move(parts[2]),
-                                      layout.featurePasses[0], layout.featurePasses[1]);
 }
 
 }  // namespace
@@ -186,8 +116,9 @@ FeatureAccumulator readFeatures(Reader& in, const FilmState& state, const StateL
 std::unique_ptr<OutputFile> beginStateFile(const std::string& path, const FilmState& state) {
   const std::string header = stateHeader(state);
   BRAID_ASSERT(header.size() <= kMaxHeader);
+  const std::vector<PlaneEntry> planes = planeTable(state);
   uint64_t planeBytes = 0;
-  forEachPlane(state, [&](const auto& values) { planeBytes += values.size() * sizeof(values[0]); });
+  for (const PlaneEntry& p : planes) planeBytes += p.bytesPerValue() * (p.sum ? p.sum->size() : p.image->size());
 
   auto file = std::make_unique<OutputFile>(path, ".state");
   ContentHash hash;
@@ -198,7 +129,11 @@ std::unique_ptr<OutputFile> beginStateFile(const std::string& path, const FilmSt
   const std::string first = fmt::format("{} {} {} {}\n", kMagic, kFormat, header.size(), planeBytes);
   write(first.data(), first.size());
   write(header.data(), header.size());
-  forEachPlane(state, [&](const auto& values) { write(values.data(), values.size() * sizeof(values[0])); });
+  for (const PlaneEntry& p : planes)
+    if (p.sum)
+      write(p.sum->data.data(), p.sum->size() * sizeof(double));
+    else
+      write(p.image->data.data(), p.image->size() * sizeof(float));
   const std::string checksum = hexString(hash.value()) + '\n';
   write(checksum.data(), checksum.size());
   return file;
@@ -216,11 +151,11 @@ FilmState readStateHeader(const std::string& path) {
 FilmState readStateFile(const std::string& path) {
   Reader in(path);
   FilmState state;
-  const StateLayout layout = readHeader(in, path, state);
-  for (size_t i = 0; i < state.estimates.size(); ++i) readEstimate(in, state, layout.estimates[i], state.estimates[i]);
-  if (layout.features) state.features = readFeatures(in, state, layout);
-  if (layout.coverage)
-    state.coverage = CoverageAccumulator::fromSums(readPlane<double>(in, state), layout.coveragePasses);
+  for (const PlaneEntry& p : readHeader(in, path, state))
+    if (p.sum)
+      readPlane(in, state, *p.sum);
+    else
+      readPlane(in, state, *p.image);
   const std::string computed = in.checksum();
   char stored[kChecksumBytes] = {};
   in.read(stored, sizeof stored);

@@ -25,24 +25,23 @@ Attribute parseAttribute(Line& line) {
   return a;
 }
 
-void parseEstimate(Line& line, FilmState& state, StateLayout& layout) {
+void parseEstimate(Line& line, FilmState& state, HistoryImages& images) {
   if (state.estimates.size() == kMaxEstimates) line.fail("too many estimates");
   EstimateState e;
-  EstimateLayout l;
   e.name = line.text();
   e.unbiased = line.flag();
   e.correlation = static_cast<Correlation>(line.integer(0, static_cast<int>(Correlation::Gradients)));
   e.lowDiscrepancy = line.flag();
   e.passesPerRound = line.integer(1, 65536);
   e.seconds = line.seconds();
-  l.rejected = line.count(~uint64_t(0));
-  l.clampedSplats = line.count(~uint64_t(0));
-  l.bias = line.flag();
-  l.parts = line.flag();
+  const uint64_t rejected = line.count(~uint64_t(0)), clampedSplats = line.count(~uint64_t(0));
+  e.sums = Accumulator(0, 0, state.buckets, line.flag());
+  e.sums.setCounts(std::vector<uint64_t>(static_cast<size_t>(state.buckets), 0), rejected, clampedSplats);
+  if (line.flag()) e.parts.emplace(0, 0, state.buckets);
   for (const EstimateState& other : state.estimates)
     if (other.name == e.name) line.fail("the estimate " + e.name + " appears twice");
   state.estimates.push_back(std::move(e));
-  layout.estimates.push_back(std::move(l));
+  images.emplace_back();
 }
 
 // How many of the passes fall into bucket k of K.
@@ -53,14 +52,16 @@ uint64_t passesOfBucket(const std::vector<PassInterval>& passes, uint64_t k, uin
   return n;
 }
 
-void parsePasses(Line& line, EstimateState& e, const EstimateLayout& l) {
+void parsePasses(Line& line, EstimateState& e) {
   while (!line.done()) {
     const PassInterval i = line.interval();
     if (!e.passes.empty() && i.begin <= e.passes.back().end) line.fail("the intervals of passes are not in order");
     e.passes.push_back(i);
   }
-  for (size_t k = 0; k < l.counts.size(); ++k)
-    if (l.counts[k] != passesOfBucket(e.passes, k, l.counts.size())) line.fail("passes and counts disagree");
+  const int buckets = e.sums.bucketCount();
+  for (int k = 0; k < buckets; ++k)
+    if (e.sums.passesInBucket(k) != passesOfBucket(e.passes, static_cast<uint64_t>(k), static_cast<uint64_t>(buckets)))
+      line.fail("passes and counts disagree");
 }
 
 void parseWindow(Line& line, FilmState& state) {
@@ -77,7 +78,8 @@ void parseWindow(Line& line, FilmState& state) {
 // What a line changes: the state, what its planes will be, and how many of them have been named.
 struct Parsed {
   FilmState& state;
-  StateLayout& layout;
+  HistoryImages& images;
+  std::vector<bool>& counted;  // estimates whose counts are known
   size_t& planes;
   std::vector<PlaneEntry>& table;
 
@@ -105,42 +107,42 @@ void parseOption(Line& line, Parsed& p) {
 }
 
 void parseCounts(Line& line, Parsed& p) {
-  p.latest(line);
-  std::vector<uint64_t>& counts = p.layout.estimates.back().counts;
-  counts.clear();
+  EstimateState& e = p.latest(line);
+  std::vector<uint64_t> counts;
   while (!line.done()) counts.push_back(line.count(kMaxPass));
-  if (counts.size() != static_cast<size_t>(p.state.buckets)) line.fail("not one per bucket");
+  if (counts.size() != static_cast<size_t>(e.sums.bucketCount())) line.fail("not one per bucket");
+  if (e.parts) e.parts->setCounts(counts);
+  e.sums.setCounts(std::move(counts), e.sums.rejected(), e.sums.clampedSplats());
+  p.counted.resize(p.state.estimates.size());
+  p.counted.back() = true;
 }
 
 void parseEstimatePasses(Line& line, Parsed& p) {
   EstimateState& e = p.latest(line);
-  if (p.layout.estimates.back().counts.empty() || !e.passes.empty()) line.fail("passes without counts");
-  parsePasses(line, e, p.layout.estimates.back());
+  if (p.counted.size() != p.state.estimates.size() || !e.passes.empty()) line.fail("passes without counts");
+  parsePasses(line, e);
 }
 
 void parseCheckpoint(Line& line, Parsed& p) {
   Checkpoint& c = p.latest(line).history.emplace_back();
   c.passes = line.count(kMaxPass);
   c.seconds = line.seconds();
-  p.layout.estimates.back().images.push_back(!line.done());
+  p.images.back().push_back(!line.done());
   if (!line.done() && line.raw() != "image") line.fail("a checkpoint with more than its image");
 }
 
 void parseFeatures(Line& line, Parsed& p) {
-  p.layout.features = true;
-  for (uint64_t& n : p.layout.featurePasses) n = line.count(kMaxPass);
+  const uint64_t ofA = line.count(kMaxPass), ofB = line.count(kMaxPass);
+  p.state.features.emplace(0, 0).setCounts(ofA, ofB);
 }
 
-void parseCoverage(Line& line, Parsed& p) {
-  p.layout.coverage = true;
-  p.layout.coveragePasses = line.count(kMaxPass);
-}
+void parseCoverage(Line& line, Parsed& p) { p.state.coverage.emplace(0, 0).setCount(line.count(kMaxPass)); }
 
 void parsePlane(Line& line, Parsed& p) {
-  if (p.planes == 0) p.table = planeTable(p.state, p.layout);
+  if (p.planes == 0) p.table = planeTable(p.state, p.images);
   const std::string name = line.text(), type = line.raw();
   if (p.planes >= p.table.size() || name != p.table[p.planes].name ||
-      type != (p.table[p.planes].bytesPerValue == 8 ? "float64" : "float32"))
+      type != (p.table[p.planes].sum ? "float64" : "float32"))
     line.fail("the plane '" + name + "' is not expected here");
   ++p.planes;
 }
@@ -160,7 +162,7 @@ constexpr std::array kWords = {
     Word{"seconds", [](Line& line, Parsed& p) { p.state.seconds = line.seconds(); }},
     Word{"option", parseOption},
     Word{"attribute", [](Line& line, Parsed& p) { p.state.attributes.push_back(parseAttribute(line)); }},
-    Word{"estimate", [](Line& line, Parsed& p) { parseEstimate(line, p.state, p.layout); }},
+    Word{"estimate", [](Line& line, Parsed& p) { parseEstimate(line, p.state, p.images); }},
     Word{"counts", parseCounts},
     Word{"passes", parseEstimatePasses},
     Word{"checkpoint", parseCheckpoint},
@@ -179,21 +181,24 @@ void parseLine(Line& line, Parsed parsed) {
 
 }  // namespace
 
-void parseStateHeader(const std::string& file, const std::string& text, FilmState& state, StateLayout& layout) {
+void parseStateHeader(const std::string& file, const std::string& text, FilmState& state, HistoryImages& images) {
   size_t number = 1, planes = 0, begin = 0;
+  std::vector<bool> counted;
   std::vector<PlaneEntry> table;
   while (begin < text.size()) {
     const size_t end = std::min(text.find('\n', begin), text.size());
     Line line(file, ++number, text.substr(begin, end - begin));
-    parseLine(line, {state, layout, planes, table});
+    parseLine(line, {state, images, counted, planes, table});
     begin = end + 1;
   }
   const Line last(file, number, "");
   if (state.window.width() <= 0) last.fail("no pixels");
   if (state.estimates.empty()) last.fail("no estimate");
-  for (const EstimateLayout& l : layout.estimates)
-    if (l.counts.size() != static_cast<size_t>(state.buckets)) last.fail("an estimate without its counts");
-  if (planes == 0 || planes != planeTable(state, layout).size()) last.fail("planes are missing in the table");
+  counted.resize(state.estimates.size());
+  for (size_t i = 0; i < counted.size(); ++i)
+    if (!counted[i] || state.estimates[i].sums.bucketCount() != state.buckets)
+      last.fail("an estimate without its counts");
+  if (planes == 0 || planes != planeTable(state, images).size()) last.fail("planes are missing in the table");
 }
 
 }  // namespace braid

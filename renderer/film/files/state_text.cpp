@@ -28,11 +28,13 @@ std::string attributeLine(const Attribute& a) {
   return fmt::format("{} {}", line, fmt::join(a.values, " "));
 }
 
-std::string estimateLines(const EstimateState& e, const EstimateLayout& layout) {
-  std::string text =
-      fmt::format("estimate {} {:d} {} {:d} {} {} {} {} {:d} {:d}\ncounts {}\npasses", escaped(e.name), e.unbiased,
-                  static_cast<int>(e.correlation), e.lowDiscrepancy, e.passesPerRound, e.seconds, layout.rejected,
-                  layout.clampedSplats, layout.bias, layout.parts, fmt::join(layout.counts, " "));
+std::string estimateLines(const EstimateState& e) {
+  const Accumulator& sums = e.sums;
+  std::string text = fmt::format("estimate {} {:d} {} {:d} {} {} {} {} {:d} {:d}\ncounts", escaped(e.name), e.unbiased,
+                                 static_cast<int>(e.correlation), e.lowDiscrepancy, e.passesPerRound, e.seconds,
+                                 sums.rejected(), sums.clampedSplats(), sums.keepsBias(), e.parts.has_value());
+  for (int k = 0; k < sums.bucketCount(); ++k) text += fmt::format(" {}", sums.passesInBucket(k));
+  text += "\npasses";
   for (const PassInterval& i : e.passes) text += fmt::format(" {}:{}", i.begin, i.end);
   text += '\n';
   for (const Checkpoint& c : e.history)
@@ -42,58 +44,35 @@ std::string estimateLines(const EstimateState& e, const EstimateLayout& layout) 
 
 }  // namespace
 
-StateLayout layoutOf(const FilmState& state) {
-  StateLayout layout;
-  for (const EstimateState& e : state.estimates) {
-    EstimateLayout l;
-    for (int k = 0; k < e.sums.bucketCount(); ++k) l.counts.push_back(e.sums.passesInBucket(k));
-    l.rejected = e.sums.rejected();
-    l.clampedSplats = e.sums.clampedSplats();
-    l.bias = e.sums.keepsBias();
-    l.parts = e.parts.has_value();
-    for (const Checkpoint& c : e.history) l.images.push_back(!c.mean.empty());
-    layout.estimates.push_back(std::move(l));
-  }
-  layout.features = state.features.has_value();
-  layout.coverage = state.coverage.has_value();
-  if (state.features) layout.featurePasses = {state.features->passesInHalf(0), state.features->passesInHalf(1)};
-  if (state.coverage) layout.coveragePasses = state.coverage->passes();
-  return layout;
-}
-
-std::vector<PlaneEntry> planeTable(const FilmState& state, const StateLayout& layout) {
+std::vector<PlaneEntry> planeTable(FilmState& state, const HistoryImages& images) {
   std::vector<PlaneEntry> table;
-  const auto colour = [&](const std::string& layer, size_t bytes) {
-    for (const char* c : {"R", "G", "B"}) table.push_back({layer + '.' + c, bytes});
+  const auto add = [&](const RawSums& sums) {
+    for (const RawSum& s : sums) table.push_back({s.name, s.plane, nullptr});
   };
   for (size_t i = 0; i < state.estimates.size(); ++i) {
-    const EstimateState& e = state.estimates[i];
-    for (int k = 0; k < state.buckets; ++k) colour(fmt::format("{}.sum{}", e.name, k), 8);
-    colour(e.name + ".squares", 8);
-    if (layout.estimates[i].bias) {
-      for (const char* half : {"A", "B"}) colour(e.name + ".bias" + half, 8);
-      colour(e.name + ".biasSquares", 8);
-    }
-    if (layout.estimates[i].parts) {
-      for (int k = 0; k < state.buckets; ++k) colour(fmt::format("{}.direct{}", e.name, k), 8);
-      colour(e.name + ".directSquares", 8);
-      colour(e.name + ".indirectSquares", 8);
-    }
-    for (size_t k = 0; k < e.history.size(); ++k) {
-      const std::string passes = std::to_string(e.history[k].passes);
-      for (const HistoryPlane& p : historyPlanes())
-        if (layout.estimates[i].images[k] || &p == historyPlanes().data()) colour(e.name + '.' + p.name + passes, 4);
-    }
+    EstimateState& e = state.estimates[i];
+    add(e.rawSums());
+    for (size_t k = 0; k < e.history.size(); ++k)
+      for (const HistoryPlane& p : historyPlanes()) {
+        if (!images[i][k] && &p != historyPlanes().data()) continue;
+        const std::string name = fmt::format("{}.{}{}", e.name, p.name, e.history[k].passes);
+        for (size_t c = 0; c < 3; ++c) table.push_back({name + kChannelSuffixes[c], nullptr, &p.of(e.history[k])[c]});
+      }
   }
-  if (layout.features)
-    for (const char* part : {"sumA", "sumB", "squares"})
-      for (int c = 0; c < FeatureSample::kComponents; ++c) table.push_back({fmt::format("features.{}{}", part, c), 8});
-  if (layout.coverage) table.push_back({"coverage", 8});
+  add(state.sharedSums());
   return table;
 }
 
+std::vector<PlaneEntry> planeTable(const FilmState& state) {
+  HistoryImages images;
+  for (const EstimateState& e : state.estimates) {
+    std::vector<bool>& of = images.emplace_back();
+    for (const Checkpoint& c : e.history) of.push_back(!c.mean.empty());
+  }
+  return planeTable(const_cast<FilmState&>(state), images);  // reads only
+}
+
 std::string stateHeader(const FilmState& s) {
-  const StateLayout layout = layoutOf(s);
   std::string text = fmt::format(
       "braid {} {} {}\nscene {}\nseed {}\npixels {} {} {} {} {} {}\nbuckets {}\nseconds {}\n",
       escaped(s.identity.version), escaped(s.identity.build), escaped(s.identity.isa), hexString(s.identity.sceneHash),
@@ -101,11 +80,11 @@ std::string stateHeader(const FilmState& s) {
   for (const StateOption& o : s.identity.options)
     text += fmt::format("option {} {}\n", escaped(o.name), escaped(o.value));
   for (const Attribute& a : s.attributes) text += attributeLine(a) + '\n';
-  for (size_t i = 0; i < s.estimates.size(); ++i) text += estimateLines(s.estimates[i], layout.estimates[i]);
-  if (layout.features) text += fmt::format("features {} {}\n", layout.featurePasses[0], layout.featurePasses[1]);
-  if (layout.coverage) text += fmt::format("coverage {}\n", layout.coveragePasses);
-  for (const PlaneEntry& p : planeTable(s, layout))
-    text += fmt::format("plane {} {}\n", escaped(p.name), p.bytesPerValue == 8 ? "float64" : "float32");
+  for (const EstimateState& e : s.estimates) text += estimateLines(e);
+  if (s.features) text += fmt::format("features {} {}\n", s.features->passesInHalf(0), s.features->passesInHalf(1));
+  if (s.coverage) text += fmt::format("coverage {}\n", s.coverage->passes());
+  for (const PlaneEntry& p : planeTable(s))
+    text += fmt::format("plane {} {}\n", escaped(p.name), p.sum ? "float64" : "float32");
   return text;
 }
 

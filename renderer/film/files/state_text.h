@@ -2,8 +2,6 @@
 // The text header of state files.
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -11,35 +9,27 @@
 
 namespace braid {
 
-// What the header says of one accumulator's planes and counts.
-struct EstimateLayout {
-  std::vector<uint64_t> counts;  // passes in each bucket
-  uint64_t rejected = 0, clampedSplats = 0;
-  bool bias = false, parts = false;
-  std::vector<bool> images;  // whether a checkpoint of the history has its image
-};
+// Of every estimate, which checkpoints of its history hold their image.
+using HistoryImages = std::vector<std::vector<bool>>;
 
-struct StateLayout {
-  std::vector<EstimateLayout> estimates;  // as in FilmState
-  bool features = false, coverage = false;
-  std::array<uint64_t, 2> featurePasses{0, 0};
-  uint64_t coveragePasses = 0;
-};
-
-// One plane of a file, in the order in which they are stored.
+// One plane of a file: float64 sums or a float32 image.
 struct PlaneEntry {
   std::string name;
-  size_t bytesPerValue = 8;  // 8: float64, 4: float32
+  Plane<double>* sum = nullptr;
+  Plane<float>* image = nullptr;
+  size_t bytesPerValue() const { return sum ? sizeof(double) : sizeof(float); }
 };
 
-StateLayout layoutOf(const FilmState& state);
-
-// The plane table that follows from the layout and, for histories, from the state.
-std::vector<PlaneEntry> planeTable(const FilmState& state, const StateLayout& layout);
+// The planes of a state in the order of files. `state` may hold accumulators of no pixels, for files that are about to
+// be read.
+std::vector<PlaneEntry> planeTable(FilmState& state, const HistoryImages& images);
+// To write them: those that the state holds.
+std::vector<PlaneEntry> planeTable(const FilmState& state);
 
 std::string stateHeader(const FilmState& state);
 
-// Reads what stateHeader() wrote into a state without planes. Throws Error(BadInput) that begins with `file`.
-void parseStateHeader(const std::string& file, const std::string& text, FilmState& state, StateLayout& layout);
+// Reads what stateHeader() wrote into a state whose planes have no pixels. Throws Error(BadInput) that begins with
+// `file`.
+void parseStateHeader(const std::string& file, const std::string& text, FilmState& state, HistoryImages& images);
 
 }  // namespace braid
