@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Runs the job that `braid plan --format slurm` prints on a real Slurm: a single node of Debian's packages with its own
 # keys, ports and folders, stopped at the end. Shows that the merged image is that of the unsplit render, that a share
-# that is told its time is up goes on in a second turn, and that a failed share cancels the merge.
+# that is told its time is up goes on in a second turn, that a failed share cancels the merge, and that an animation of
+# 24 frames is finished by a second submission after a share and a merge have failed.
 #   tests/slurm_end_to_end.sh [BRAID]     (as root, or with Slurm's packages installed)
 # Where Slurm cannot run it prints "SKIPPED: reason" and exits with 77.
 set -euo pipefail
@@ -142,4 +143,59 @@ sed 's/--size=64x48/--size=no/' job.sh | sed 's/my out/bad/g' >bad.sh
 submit bad.sh
 await "$merge" CANCELLED 60
 [[ ! -e bad.exr ]] || fail "an image was made of failed shares"
+echo "4. 24 frames, of which a share and a merge fail"
+python3 - "$scene" moving.glb <<'END_OF_PYTHON'
+import json, struct, sys
+
+data = open(sys.argv[1], "rb").read()
+size = struct.unpack("<I", data[12:16])[0]
+root, binary = json.loads(data[20:20 + size]), data[28 + size:]
+keys = struct.pack("<8f", 0, 1, 0, 0, 0, 0, 0.1, 0)
+views = root["bufferViews"]
+for offset, length in ((0, 8), (8, 24)):
+    views.append({"buffer": 0, "byteOffset": len(binary) + offset, "byteLength": length})
+root["accessors"] += [
+    {"bufferView": len(views) - 2, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0], "max": [1]},
+    {"bufferView": len(views) - 1, "componentType": 5126, "count": 2, "type": "VEC3"}]
+node = next(i for i, n in enumerate(root["nodes"]) if "mesh" in n and "matrix" not in n)
+last = len(root["accessors"]) - 1
+root["animations"] = [{"samplers": [{"input": last - 1, "output": last}],
+                       "channels": [{"sampler": 0, "target": {"node": node, "path": "translation"}}]}]
+root["buffers"][0]["byteLength"] = len(binary) + 32
+text = json.dumps(root).encode()
+text += b" " * (-len(text) % 4)
+binary += keys
+out = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary
+open(sys.argv[2], "wb").write(struct.pack("<III", 0x46546C67, 2, 12 + len(out)) + out)
+END_OF_PYTHON
+cat >flaky <<END_OF_FLAKY
+#!/bin/sh
+case "\$*" in
+*--passes=4:8*--frames=5:6*) mkdir failed_share 2>/dev/null && exit 9 ;;
+merge*--frame=11*) mkdir failed_merge 2>/dev/null && exit 9 ;;
+esac
+exec '$braid' "\$@"
+END_OF_FLAKY
+chmod +x flaky
+frames=(--frames 0:24 --fps 24)
+"$braid" plan moving.glb -q "${options[@]}" "${frames[@]}" --spp 8 --threads 1 --tasks 2 --format slurm \
+  --program "$work/job/flaky" -o "f_##.exr" >frames.sh
+merges() { bash frames.sh | tee /dev/stderr | sed -E 's/.* ([0-9]+) *$/\1/'; }
+ended() { ! squeue -h -j "$1" 2>/dev/null | grep -q .; }
+merge=$(merges)
+for ((i = 0; i < 600; ++i)); do ended "$merge" && break; sleep 0.2; done
+count=$(ls f_??.exr | wc -l)
+[[ $count == 22 && ! -e f_05.exr && ! -e f_11.exr ]] || fail "expected 22 frames, all but 5 and 11: $(ls f_??.exr)"
+echo "  22 frames are there; the job is submitted again"
+touch -d '1 hour ago' f_??.exr
+merge=$(merges)
+for ((i = 0; i < 600; ++i)); do ended "$merge" && break; sleep 0.2; done
+[[ $(ls f_??.exr | wc -l) == 24 ]] || fail "frames are missing: $(ls f_??.exr)"
+[[ $(find . -name 'f_??.exr' -newermt '30 minutes ago' | wc -l) == 2 ]] || fail "finished frames were made again"
+"$braid" render moving.glb -q "${options[@]}" "${frames[@]}" --spp 8 --aovs all -o "w_##.exr"
+for ((i = 0; i < 24; ++i)); do
+  n=$(printf %02d $i)
+  "$braid" compare "f_$n.exr" "w_$n.exr" --metric relL2,MSE --max 1e-6 >/dev/null || fail "frame $n differs"
+done
+echo "  all 24 are those of one process"
 echo "PASSED"

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // `braid merge`: the states of several machines' shares become one, as if one machine had rendered all passes.
 #include <algorithm>
+#include <filesystem>
+#include <optional>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -10,6 +12,7 @@
 #include "renderer/film/files/state_file.h"
 #include "tools/options/cli.h"
 #include "tools/options/file_uses.h"
+#include "tools/options/frames.h"
 #include "tools/options/syntax/help.h"
 #include "tools/images/exr_metadata.h"
 #include "tools/publish/image_output.h"
@@ -24,8 +27,9 @@ struct MergeOptions {
   std::vector<std::string> parts;
   ImageOutput image;
   std::string checkpoint;
+  std::optional<uint64_t> frame;
   int threads = 0;
-  bool quiet = false;
+  bool quiet = false, overwrite = false;
 };
 
 struct Part {
@@ -114,6 +118,21 @@ void sayResult(const MergeOptions& o, const WrittenImage& written, const std::ve
              written.error ? fmt::format(", estimated error {:.3g}", *written.error) : "");
 }
 
+// Of one frame: files bear its number. A merged image is written whole, so that one that is there is finished.
+int runMerge(const MergeOptions& o);
+
+int runFrameMerge(MergeOptions o) {
+  for (std::string* file : {&o.image.file, &o.image.png, &o.checkpoint}) *file = withFrameNumber(*file, *o.frame);
+  for (std::string& part : o.parts) part = withFrameNumber(part, *o.frame);
+  const std::vector<std::string> files = filesOf(o);
+  const bool finished = !o.overwrite && !files.empty() && std::all_of(files.begin(), files.end(), [](const auto& file) {
+    return std::filesystem::is_regular_file(file);
+  });
+  if (!finished) return runMerge(o);
+  if (!o.quiet) fmt::print(stderr, "frame {}: {} is there already (--overwrite: anew)\n", *o.frame, files.front());
+  return 0;
+}
+
 int runMerge(const MergeOptions& o) {
   for (const std::string& name : o.image.combine.methods) makeCombinePlan({}, {name}, {});  // unknown names first
   checkOutputs(o);
@@ -156,7 +175,13 @@ void addMerge(CLI::App& app, Action& action) {
   command->add_flag("-q,--quiet", o.quiet, "Errors only");
   showFirst(*command, kMessageHelp, {"--quiet"});
   showFirst(*command, kOutputHelp, {"--checkpoint", "--threads"});
-  command->callback([options, &action] { action = [options] { return runMerge(*options); }; });
+  command
+      ->add_option("--frame", o.frame, "Put this number in place of the # signs in names of files; what is there stays")
+      ->check(wholeNumber(0, 1000000));
+  command->add_flag("--overwrite", o.overwrite, "With --frame: merge again what is there already");
+  command->callback([options, &action] {
+    action = [options] { return options->frame ? runFrameMerge(*options) : runMerge(*options); };
+  });
 }
 
 }  // namespace braid

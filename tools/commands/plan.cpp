@@ -13,6 +13,7 @@
 #include "renderer/film/files/picture.h"
 #include "tools/farm/farm_job.h"
 #include "tools/options/cli.h"
+#include "tools/options/frames.h"
 #include "tools/options/syntax/help.h"
 #include "tools/options/syntax/option_checks.h"
 #include "tools/options/output_options.h"
@@ -25,6 +26,7 @@ namespace {
 
 struct PlanOptions {
   SceneChoice scene;
+  FrameChoice frames;
   SampleChoice samples;
   ImageOutput image;
   bool transparent = false, json = false;
@@ -35,7 +37,7 @@ struct PlanOptions {
   double saveSeconds = 0;
   const CLI::Option* saveEvery = nullptr;  // of which the job gets the words
   // The command's own options, to carry on what was given: those of the scene and samples, then those of the image.
-  std::vector<const CLI::Option*> renderOptions, imageOptions;
+  std::vector<const CLI::Option*> renderOptions, imageOptions, frameOptions;
 };
 
 // The options of the command that `add` appends to it.
@@ -74,6 +76,11 @@ FarmJob farmJob(const PlanOptions& o, const Settings& planned) {
   job.tasks = o.tasks;
   job.threads = o.samples.threads;
   carry(o.renderOptions, {"spp", "threads"}, job.render);
+  carry(o.frameOptions, {"frames"}, job.render);
+  if (o.frames.any()) {
+    const FrameRange frames = o.frames.frames();
+    job.frames = {frames.first, frames.step, frames.count()};
+  }
   carry(o.imageOptions,
         {"output", "png", "tone", "exposure", "aovs", "quarters", "history", "direct-indirect", "float", "layer-prefix",
          "weights", "reproducible"},
@@ -101,6 +108,10 @@ void checkJobOptions(const PlanOptions& o) {
   if (o.image.file.empty()) refuse("--tasks: name the merged image with -o OUT.exr");
   if (o.image.file == kStandardOutput || o.image.png == kStandardOutput)
     refuse("--tasks: standard output gets the job: give the merged image another name");
+  if (o.frames.any() && o.frames.frames().count() > 1)
+    for (const std::string& file : {o.image.file, o.image.png, o.checkpoint})
+      if (!file.empty() && !holdsFrameNumber(file))
+        throw Error(ExitCode::Usage, file + ": frames need a place for their number, such as out_####.exr");
   if (o.samples.seconds > 0) refuse("--time: shares are made of passes, so give --spp alone");
 }
 
@@ -122,7 +133,9 @@ void printRecord(const PreparedRender& render, const std::string& file) {
 }
 
 int runPlan(PlanOptions o) {
+  checkFrames(o.frames, o.scene.frameTime >= 0);
   checkJobOptions(o);
+  if (o.frames.plays()) o.scene.frameTime = o.frames.timeOf(o.frames.frames().first);
   if (!o.image.file.empty()) imageFormat(o.image.file);
   Settings settings = makeSettings(o.scene, o.samples);
   settings.keep = o.image.buffers();
@@ -166,7 +179,7 @@ constexpr const char* kPlanHints =
     "  braid plan scene.glb\n"
     "  braid plan scene.glb -o out.exr --spp 4096 --tasks 16 --format slurm > job.sh\n"
     "      bash job.sh --partition=long --time=8:00:00       (options of sbatch)\n"
-    "  braid plan scene.glb -o out.exr --spp 1024 --threads 4 --tasks 8 --format make > job.mk\n"
+    "  braid plan scene.glb -o out_####.exr --frames 0:240 --spp 64 --tasks 2 --format make > job.mk\n"
     "      make -j2 -f job.mk\n"
     "  braid plan scene.glb -o out.exr --spp 4096 --tasks 16 --format opencue > job.py\n"
     "      SHOW=testing python3 job.py\n"
@@ -186,6 +199,7 @@ void addPlan(CLI::App& app, Action& action) {
     addSceneOptions(*command, o.scene);
     addSampleOptions(*command, o.samples);
   });
+  o.frameOptions = added(*command, [&] { addFrameRangeOptions(*command, o.frames); });
   o.imageOptions = added(*command, [&] { addImageOptions(*command, o.image); });
   command->add_flag("--transparent", o.transparent, "Alpha channel; camera rays that miss add nothing");
   command->add_flag("--json", o.json, "As JSON");

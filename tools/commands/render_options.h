@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "tools/options/frames.h"
 #include "tools/options/scene_options.h"
 #include "tools/publish/image_output.h"
 #include "tools/publish/tev_client.h"
@@ -14,6 +15,7 @@ namespace braid {
 
 struct RenderOptions {
   SceneChoice scene;
+  FrameChoice frames;
   SampleChoice samples;
   ImageOutput image;
   std::string logJson, checkpoint, resumeFile;

@@ -26,15 +26,15 @@ std::string describe(const RunReport::RejectedSample& r, const RenderOptions& o)
 }  // namespace
 
 RunTimes timesOf(const OpenedScene& opened, const LoopTimes& loop, const WrittenImage& written) {
-  const BuildTimes& build = opened.scene->buildTimes();
+  const BuildTimes build = opened.reused ? BuildTimes{} : opened.scene->buildTimes();
   RunTimes t;
   t.load = opened.loadSeconds;
   t.prepare = build.prepare;
   t.hierarchy = build.hierarchy;
-  t.start = std::max(0.0, loop.began - t.load - t.prepare - t.hierarchy);
+  t.start = std::max(0.0, loop.began - loop.imageBegan - t.load - t.prepare - t.hierarchy);
   t.render = loop.ended - loop.began - written.secondsOfRun;
   t.combine = written.combineSeconds;
-  t.total = processSeconds();
+  t.total = processSeconds() - loop.imageBegan;
   t.write = std::max(0.0, t.total - t.beforeRender() - t.render - t.combine);
   return t;
 }

@@ -15,9 +15,10 @@
 
 namespace braid {
 
-// When the pass loop began and ended, by the clock of the process.
+// When the pass loop began and ended, and the work for the image began, by the clock of the process.
 struct LoopTimes {
   double began = 0, ended = 0;
+  double imageBegan = 0;
 };
 
 // A render that has ended.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/commands/render_state.h"
 
+#include <algorithm>
 #include <filesystem>
 
 #include <fmt/format.h>
@@ -51,6 +52,21 @@ std::optional<FilmState> earlierState(const RenderOptions& o, const Settings& se
                       file, e.firstPass(), e.endPass(), e.name, begin, end));
   }
   return state;
+}
+
+bool holdsAllPasses(const RenderOptions& o) {
+  const PassInterval rounds = o.passes.value_or(PassInterval{0, o.samples.spp});
+  std::error_code ignored;
+  if (rounds.end == 0 || o.error > 0 || !std::filesystem::is_regular_file(o.checkpoint, ignored)) return false;
+  try {
+    const FilmState state = readStateHeader(o.checkpoint);
+    return std::all_of(state.estimates.begin(), state.estimates.end(), [&](const EstimateState& e) {
+      const auto perRound = static_cast<uint64_t>(e.passesPerRound);
+      return e.passes.size() == 1 && e.firstPass() <= rounds.begin * perRound && e.endPass() >= rounds.end * perRound;
+    });
+  } catch (const Error&) {
+    return false;  // resuming it says what is wrong
+  }
 }
 
 void keepAsBefore(const FilmState& state, Settings& settings) {

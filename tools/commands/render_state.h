@@ -19,6 +19,9 @@ void protectCheckpoint(const RenderOptions& options);
 // The state to go on from, if there is one.
 std::optional<FilmState> earlierState(const RenderOptions& options, const Settings& settings);
 
+// Whether the checkpoint of --passes, or of --spp, holds all of them already.
+bool holdsAllPasses(const RenderOptions& options);
+
 // What an earlier run kept is kept on, whether or not this one's outputs need it.
 void keepAsBefore(const FilmState& state, Settings& settings);
 

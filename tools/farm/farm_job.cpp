@@ -16,6 +16,12 @@ using namespace farm;
 
 namespace {
 
+// Of an image: its name among the rules, what those of its shares begin with, and its frame.
+struct FarmTarget {
+  std::string name, prefix;
+  std::optional<uint64_t> frame;
+};
+
 void requireCarriable(const FarmJob& job, FarmFormat format) {
   Words words{job.program, job.folder};
   for (const Words& more : {renderWords(job), mergeWords(job)}) words.insert(words.end(), more.begin(), more.end());
@@ -34,12 +40,15 @@ void requireCarriable(const FarmJob& job, FarmFormat format) {
   }
 }
 
-// The array's script runs braid as a child: bash has to stay, to ask for another turn when the time limit is near.
+// The array's script runs braid as a child.
 std::string slurmText(const FarmJob& job, const std::vector<PassInterval>& shares) {
   std::string passes;
   for (const PassInterval& p : shares) passes += fmt::format("{}{}:{}", passes.empty() ? "" : " ", p.begin, p.end);
-  const std::string threads =
-      job.threads > 0 ? std::to_string(job.threads) : std::string("\"${SLURM_CPUS_ON_NODE:-0}\"");
+  const std::string threads = slurmThreads(job);
+  const std::string command = fmt::format(
+      R"({program} {render} --passes="${{passes[SLURM_ARRAY_TASK_ID]}}" --checkpoint={stem}.shard"$SLURM_ARRAY_TASK_ID".state --threads={threads})",
+      fmt::arg("program", shellQuoted(job.program)), fmt::arg("render", shellLine(renderWords(job))),
+      fmt::arg("stem", shellQuoted(stemOf(job.output))), fmt::arg("threads", threads));
   return fmt::format(
       R"(#!/bin/bash
 # {title}.
@@ -50,24 +59,7 @@ set -euo pipefail
 cd -- {folder}
 
 shares=$(sbatch --parsable --job-name={name} --array=0-{last} --requeue --signal=B:USR1@120{cpus} "$@" <<'END_OF_SHARE'
-#!/bin/bash
-cd -- {folder} || exit
-passes=({passes})
-signalled=
-again=
-trap 'signalled=yes' TERM  # Slurm sends it to braid as well, which saves and ends
-trap 'signalled=yes; again=yes; kill -TERM "$render"' USR1
-{program} {render} --passes="${{passes[SLURM_ARRAY_TASK_ID]}}" --checkpoint={stem}.shard"$SLURM_ARRAY_TASK_ID".state --threads={threads} &
-render=$!
-while true; do
-  wait "$render"
-  code=$?
-  [ -n "$signalled" ] || break
-  signalled=
-done
-if [ -n "$again" ] && [ "$code" -eq 130 ]; then exec scontrol requeue "$SLURM_JOB_ID"; fi
-exit "$code"
-END_OF_SHARE
+{share}END_OF_SHARE
 )
 shares=${{shares%%;*}}
 
@@ -79,10 +71,10 @@ END_OF_MERGE
 echo "shares: job $shares, merge: job ${{merge%%;*}}"
 )",
       fmt::arg("title", jobTitle(job)), fmt::arg("folder", shellQuoted(job.folder)), fmt::arg("name", jobName(job)),
-      fmt::arg("last", job.tasks - 1), fmt::arg("passes", passes), fmt::arg("program", shellQuoted(job.program)),
+      fmt::arg("last", job.tasks - 1), fmt::arg("program", shellQuoted(job.program)),
       fmt::arg("cpus", job.threads > 0 ? fmt::format(" --cpus-per-task={}", job.threads) : ""),
-      fmt::arg("render", shellLine(renderWords(job))), fmt::arg("stem", shellQuoted(stemOf(job.output))),
-      fmt::arg("threads", threads), fmt::arg("merge", shellLine(mergeWords(job))),
+      fmt::arg("share", slurmShareScript(job, "passes=(" + passes + ")\n", command)),
+      fmt::arg("merge", shellLine(mergeWords(job))),
       fmt::arg("merge_threads", job.threads > 0 ? "" : " --threads=" + threads));
 }
 
@@ -92,34 +84,70 @@ std::string makeQuoted(std::string text) {
   return text;
 }
 
-// The targets are no files: a state is there from the first checkpoint on, finished or not.
-std::string makeText(const FarmJob& job, const std::vector<PassInterval>& shares) {
+// The command of a rule: words, and what a frame adds to them.
+std::string makeRule(const FarmJob& job, const std::string& target, const std::string& after, Words words,
+                     const std::string& frame) {
+  if (!frame.empty()) words.push_back(frame);
+  return fmt::format(
+      "{}:{}\n\t{}\n", target, after,
+      makeQuoted("cd -- " + shellQuoted(job.folder) + " && " + shellQuoted(job.program) + " " + shellLine(words)));
+}
+
+// The targets are no files: a state is there from the first checkpoint on, finished or not. `frame`: of which target.
+std::string makeImage(const FarmJob& job, const std::vector<PassInterval>& shares, const FarmTarget& of,
+                      std::string& targets) {
   std::string names, rules;
-  const auto command = [&](const Words& words) {
-    return makeQuoted("cd -- " + shellQuoted(job.folder) + " && " + shellQuoted(job.program) + " " + shellLine(words));
-  };
   for (uint64_t k = 0; k < job.tasks; ++k) {
-    names += fmt::format(" share{}", k);
-    rules += fmt::format("share{}:\n\t{}\n", k, command(shareWords(job, k, shares[k])));
+    const std::string name = fmt::format("{}share{}", of.prefix, k);
+    names += ' ' + name;
+    rules += makeRule(job, name, "", shareWords(job, k, shares[k]), of.frame ? renderFrame(*of.frame) : "");
+  }
+  targets += ' ' + of.name + names;
+  return makeRule(job, of.name, names, mergeWords(job), of.frame ? mergeFrame(*of.frame) : "") + rules;
+}
+
+std::string makeText(const FarmJob& job, const std::vector<PassInterval>& shares) {
+  std::string targets, rules, all;
+  if (job.frames.count == 0) rules = makeImage(job, shares, {"merge", "", {}}, targets);
+  for (uint64_t i = 0; i < job.frames.count; ++i) {
+    const uint64_t frame = job.frames.at(i);
+    const std::string name = fmt::format("frame{}", frame);
+    all += ' ' + name;
+    rules += makeImage(job, shares, {name, name + "_", frame}, targets);
+  }
+  if (!all.empty()) {
+    targets = " frames" + targets;
+    rules = "frames:" + all + "\n" + rules;
   }
   return fmt::format(
       "# {}.\n"
       "#   make -j4 -f THIS_FILE\n"
-      "# Four shares at a time, each with {}. Run again after an interruption, it goes on from the checkpoints.\n"
+      "# Four shares at a time, each with {}. Run again after an interruption, it goes on from the checkpoints{}.\n"
       "SHELL = /bin/sh\n"
-      "merge:{}\n\t{}\n{}.PHONY: merge{}\n",
+      "{}.PHONY:{}\n",
       jobTitle(job),
-      job.threads > 0 ? fmt::format("--threads {}", job.threads) : "all processors unless plan gets --threads", names,
-      command(mergeWords(job)), rules, names);
+      job.threads > 0 ? fmt::format("--threads {}", job.threads) : "all processors unless plan gets --threads",
+      all.empty() ? "" : "; with -k, a frame that fails does not keep the others from being rendered", rules, targets);
 }
 
 // Workers run `exec` without a shell; env changes the folder.
 std::string flamencoText(const FarmJob& job, const std::vector<PassInterval>& shares) {
-  nlohmann::ordered_json data = {{"folder", job.folder}, {"program", job.program}, {"shares", {}}, {"merge", {}}};
-  for (uint64_t k = 0; k < job.tasks; ++k)
-    data["shares"].push_back({{"name", fmt::format("passes {}:{}", shares[k].begin, shares[k].end)},
-                              {"args", shareWords(job, k, shares[k])}});
-  data["merge"] = {{"name", "merge"}, {"args", mergeWords(job)}};
+  nlohmann::ordered_json data = {{"folder", job.folder}, {"program", job.program}, {"images", {}}};
+  for (uint64_t i = 0; i < std::max<uint64_t>(1, job.frames.count); ++i) {
+    const bool framed = job.frames.count > 0;
+    const std::string name = framed ? fmt::format("frame {} ", job.frames.at(i)) : "";
+    nlohmann::ordered_json image = {{"shares", {}}, {"merge", {}}};
+    for (uint64_t k = 0; k < job.tasks; ++k) {
+      Words words = shareWords(job, k, shares[k]);
+      if (framed) words.push_back(renderFrame(job.frames.at(i)));
+      image["shares"].push_back(
+          {{"name", fmt::format("{}passes {}:{}", name, shares[k].begin, shares[k].end)}, {"args", words}});
+    }
+    Words words = mergeWords(job);
+    if (framed) words.push_back(mergeFrame(job.frames.at(i)));
+    image["merge"] = {{"name", name + "merge"}, {"args", words}};
+    data["images"].push_back(image);
+  }
   return fmt::format(
       R"(// {title}.
 // Save as {name}.js in the folder `scripts` beside Flamenco Manager, then submit:
@@ -142,14 +170,18 @@ function makeTask(job, step, type) {{
   return task;
 }}
 
-function compileJob(job) {{
-  const merge = makeTask(job, DATA.merge, "misc");
-  for (let i = 0; i < DATA.shares.length; i++) {{
-    const share = makeTask(job, DATA.shares[i], "misc");
+function compileImage(job, image) {{
+  const merge = makeTask(job, image.merge, "misc");
+  for (let i = 0; i < image.shares.length; i++) {{
+    const share = makeTask(job, image.shares[i], "misc");
     job.addTask(share);
     merge.addDependency(share);
   }}
   job.addTask(merge);
+}}
+
+function compileJob(job) {{
+  for (let i = 0; i < DATA.images.length; i++) compileImage(job, DATA.images[i]);
 }}
 )",
       fmt::arg("title", jobTitle(job)), fmt::arg("name", jobName(job)),
@@ -207,9 +239,9 @@ std::string farmJobText(const FarmJob& job, FarmFormat format) {
   requireCarriable(job, format);
   switch (format) {
     case FarmFormat::Slurm:
-      return slurmText(job, shares);
+      return job.frames.count > 0 ? slurmFramesText(job, shares) : slurmText(job, shares);
     case FarmFormat::OpenCue:
-      return openCueText(job, shares);
+      return job.frames.count > 0 ? openCueFramesText(job, shares) : openCueText(job, shares);
     case FarmFormat::Flamenco:
       return flamencoText(job, shares);
     case FarmFormat::Make:

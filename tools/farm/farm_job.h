@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One render as a job for an existing farm: shares by passes (`braid render --passes A:B`), each with a checkpoint that
-// a task started again goes on from, and a merge that waits for all of them. Options in, text out; nothing is run.
+// a task started again goes on from, and a merge that waits for all of them; or the same for every frame of an
+// animation. Options in, text out; nothing is run.
 #pragma once
 
 #include <cstdint>
@@ -24,6 +25,12 @@ struct FarmOption {
   bool operator==(const FarmOption&) const = default;
 };
 
+// Frames first, first + step, …
+struct FarmFrames {
+  uint64_t first = 0, step = 1, count = 0;  // count 0: one image without a number
+  uint64_t at(uint64_t i) const { return first + i * step; }
+};
+
 struct FarmJob {
   std::string program;        // the braid that the machines run
   std::string folder;         // absolute: where relative file names count
@@ -31,7 +38,8 @@ struct FarmJob {
   std::vector<FarmOption> render,
       merge;  // besides those that this file adds: scene, passes, checkpoint, output, threads
   uint64_t spp = 0, tasks = 0;
-  int threads = 0;  // of every share; 0: as many processors as the farm gives it
+  FarmFrames frames;  // names of files hold a place for their numbers, which braid fills
+  int threads = 0;    // of every share; 0: as many processors as the farm gives it
 };
 
 // [0, spp) in `tasks` intervals, in order. Pass p belongs to quarter p % 4 and half p % 2 (film.h), so all but the last
@@ -46,8 +54,10 @@ std::string shareFile(const std::string& output, uint64_t task);
 std::string shellQuoted(const std::string& text);
 
 // The whole job:
-//   slurm     bash script that submits an array and the merge (sbatch, afterok)
-//   opencue   Python script that launches an outline of two layers
+//   slurm     bash script that submits an array and the merge (sbatch, afterok); with frames an array over them for
+//   every
+//             share, and one of merges whose tasks wait for theirs (aftercorr)
+//   opencue   Python script that launches an outline of two layers; with frames one a share and one of merges
 //   flamenco  JavaScript job type for the Manager's folder `scripts`
 //   make      Makefile
 // Throws Error(Usage) for what a format cannot carry: control characters in all of them, text that is not UTF-8 in

@@ -54,6 +54,46 @@ std::string cueCommand(const std::string& script) {
 
 }  // namespace
 
+std::string openCueFramesText(const FarmJob& job, const std::vector<PassInterval>& shares) {
+  const std::string begin =
+      fmt::format("f=$(({} + {} * (#IFRAME# - 1))); cd -- {} && exec {}", job.frames.first, job.frames.step,
+                  withoutTokens(shellQuoted(job.folder)), withoutTokens(shellQuoted(job.program)));
+  const std::string threads =
+      job.threads > 0 ? "" : std::string(" --threads=\"${CUE_THREADS:-0}\"");  // the words have the number
+  const std::string cores =
+      job.threads > 0 ? fmt::format(", threads={0}, cores={0}, overrideCores=True", job.threads) : "";
+  std::string layers;
+  const auto layer = [&](const std::string& name, const std::string& script) {
+    layers += fmt::format(
+        "layers.append(outline.modules.shell.Shell(\n    {}, command=[{}],\n    range=\"1-{}\", chunk=1, "
+        "threadable=True{}))\n",
+        nlohmann::json(name).dump(), nlohmann::json(cueCommand(script)).dump(), job.frames.count, cores);
+  };
+  for (uint64_t k = 0; k < job.tasks; ++k)
+    layer(fmt::format("share{}", k),
+          begin + cueWords(shareWords(job, k, shares[k])) + " --frames=$f:$((f + 1))" + threads);
+  layer("merge", begin + cueWords(mergeWords(job)) + " --frame=$f" + threads);
+  return fmt::format(
+      R"(#!/usr/bin/env python3
+# {title}.
+#   python3 THIS_FILE    where OpenCue's packages are installed; SHOW, SHOT and the like as for every outline
+# A share that is retried goes on from its checkpoint. The render hosts need braid and the folder, and no Python package.
+import outline
+import outline.cuerun
+import outline.modules.shell
+
+job = outline.Outline({name})
+layers = []
+{layers}for layer in layers:
+    job.add_layer(layer)
+for share in layers[:-1]:
+    layers[-1].depend_on(share)  # frame by frame
+outline.cuerun.launch(job, range="1-{frames}", use_pycuerun=False)
+)",
+      fmt::arg("title", jobTitle(job)), fmt::arg("name", nlohmann::json(jobName(job)).dump()),
+      fmt::arg("layers", layers), fmt::arg("frames", job.frames.count));
+}
+
 std::string openCueText(const FarmJob& job, const std::vector<PassInterval>& shares) {
   const std::string begin = fmt::format("cd -- {} && exec {}", withoutTokens(shellQuoted(job.folder)),
                                         withoutTokens(shellQuoted(job.program)));

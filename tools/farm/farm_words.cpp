@@ -51,6 +51,9 @@ Words mergeWords(const FarmJob& job) {
   return words;
 }
 
+std::string renderFrame(uint64_t frame) { return fmt::format("--frames={}:{}", frame, frame + 1); }
+std::string mergeFrame(uint64_t frame) { return fmt::format("--frame={}", frame); }
+
 std::string shellLine(const Words& words) {
   std::string text;
   for (const std::string& w : words) text += (text.empty() ? "" : " ") + shellQuoted(w);
@@ -65,8 +68,11 @@ std::string jobName(const FarmJob& job) {
 }
 
 std::string jobTitle(const FarmJob& job) {
-  return fmt::format("braid render of {}: {} samples per pixel in {} shares, and their merge to {}", job.scene, job.spp,
-                     job.tasks, job.output);
+  if (job.frames.count == 0)
+    return fmt::format("braid render of {}: {} samples per pixel in {} shares, and their merge to {}", job.scene,
+                       job.spp, job.tasks, job.output);
+  return fmt::format("braid render of {}: {} frames of {} samples per pixel in {} shares, each with its merge to {}",
+                     job.scene, job.frames.count, job.spp, job.tasks, job.output);
 }
 
 }  // namespace braid::farm

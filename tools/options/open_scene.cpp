@@ -47,6 +47,22 @@ double depthAt(const Scene& scene, const CameraData& data, const SceneChoice& c,
   return static_cast<double>(hit.t * glm::dot(ray.direction, camera.forward()));
 }
 
+LoadOptions loadOptions(const SceneChoice& c) {
+  LoadOptions options = c.load;
+  options.defaultLight = c.environment.empty() ? c.defaultLight : DefaultLight::None;
+  options.keepAllAttributes = c.full;
+  options.camera = c.lookAt ? "none" : c.camera;
+  if (c.frameScene >= 0) options.scene = c.frameScene;
+  if (c.frameTime >= 0) options.frameTime = static_cast<float>(c.frameTime);
+  return options;
+}
+
+LogSink sinkOf(const SceneChoice& c) {
+  return [quiet = c.quiet](LogLevel level, const std::string& line) {
+    if (!quiet && level == LogLevel::Warning) fmt::print(stderr, "warning: {}\n", line);
+  };
+}
+
 }  // namespace
 
 void fitLens(const Scene& scene, const SceneChoice& c, CameraData& camera) {
@@ -66,33 +82,17 @@ void fitLens(const Scene& scene, const SceneChoice& c, CameraData& camera) {
   camera.lensRadius = static_cast<float>(0.5 * width);
 }
 
-OpenedScene openScene(const SceneChoice& choice) {
-  const Stopwatch clock;
-  SceneData data = loadScene(choice);
-  OpenedScene opened;
-  opened.loadSeconds = clock.seconds();
-  opened.camera = chooseCamera(data, choice);
-  if (choice.ground) addGround(data);
-  opened.scene = buildScene(std::move(data), choice, opened.camera);
-  fitLens(*opened.scene, choice, opened.camera);
-  return opened;
-}
+SceneOpener::SceneOpener(const SceneChoice& choice)
+    : choice_(choice), file_(choice.file, loadOptions(choice), sinkOf(choice)) {}
 
-SceneData loadScene(const SceneChoice& c) {
-  LoadOptions options = c.load;
-  options.defaultLight = c.environment.empty() ? c.defaultLight : DefaultLight::None;
-  options.keepAllAttributes = c.full;
-  options.camera = c.lookAt ? "none" : c.camera;
-  if (c.frameScene >= 0) options.scene = c.frameScene;
-  if (c.frameTime >= 0) options.frameTime = static_cast<float>(c.frameTime);
-  const LogSink sink = [&c](LogLevel level, const std::string& line) {
-    if (!c.quiet && level == LogLevel::Warning) fmt::print(stderr, "warning: {}\n", line);
-  };
-  SceneData data = loadGltf(c.file, options, sink);
+SceneData SceneOpener::load(double frameTime) {
+  const SceneChoice& c = choice_;
+  SceneData data = file_.pose(frameTime >= 0 ? std::optional(static_cast<float>(frameTime)) : std::nullopt);
   const auto scale = static_cast<float>(c.lightScale);
   if (!c.environment.empty()) {
+    if (!environment_) environment_ = readImageFile(c.environment);
     EnvironmentData e;
-    e.image = readImageFile(c.environment);
+    e.image = environment_;
     e.radiance = Spectrum(static_cast<float>(c.environmentScale));
     e.rotation = glm::radians(static_cast<float>(c.environmentRotation));
     data.environment = e;
@@ -104,6 +104,29 @@ SceneData loadScene(const SceneChoice& c) {
   for (PunctualLight& l : data.lights) l.intensity *= scale;
   return data;
 }
+
+OpenedScene SceneOpener::open(double frameTime) {
+  const Stopwatch clock;
+  SceneData data = load(frameTime);
+  OpenedScene opened;
+  opened.loadSeconds = clock.seconds();
+  opened.camera = chooseCamera(data, choice_);
+  if (choice_.ground) addGround(data);
+  opened.scene = buildScene(std::move(data), choice_, opened.camera);
+  fitLens(*opened.scene, choice_, opened.camera);
+  return opened;
+}
+
+OpenedScene openScene(const SceneChoice& choice) {
+  const Stopwatch clock;
+  SceneOpener source(choice);
+  const double readSeconds = clock.seconds();
+  OpenedScene opened = source.open(choice.frameTime);
+  opened.loadSeconds += readSeconds;
+  return opened;
+}
+
+SceneData loadScene(const SceneChoice& choice) { return SceneOpener(choice).load(choice.frameTime); }
 
 std::unique_ptr<Scene> buildScene(SceneData data, const SceneChoice& c, const CameraData& camera) {
   SceneOptions options;

@@ -13,6 +13,21 @@ struct OpenedScene {
   std::unique_ptr<Scene> scene;
   CameraData camera;
   double loadSeconds = 0;  // reading and decoding
+  bool reused = false;     // by an earlier frame: nothing was built
+};
+
+// The files of a scene, opened once for any number of poses.
+class SceneOpener {
+ public:
+  explicit SceneOpener(const SceneChoice& choice);
+  // Everything that the choice changes in the file (environment, light scale) included. `frameTime` as in SceneChoice.
+  SceneData load(double frameTime);
+  OpenedScene open(double frameTime);
+
+ private:
+  const SceneChoice choice_;
+  SceneFile file_;
+  std::shared_ptr<const Image> environment_;
 };
 
 // Loads, chooses the camera and builds; warnings go to standard error unless quiet.

@@ -10,7 +10,12 @@ namespace braid {
 
 PreparedRender prepareRender(const SceneChoice& scene, const Settings& settings, CombineChoice& combine,
                              const RenderExtent& extent) {
-  PreparedRender r{openScene(scene), makeIntegrators(), {}};
+  return prepareRender(openScene(scene), settings, combine, extent);
+}
+
+PreparedRender prepareRender(OpenedScene opened, const Settings& settings, CombineChoice& combine,
+                             const RenderExtent& extent) {
+  PreparedRender r{std::move(opened), makeIntegrators(), {}};
   r.planned = planRender(r.scene(), r.opened.camera, settings, pointersTo(r.integrators), combine, extent);
   return r;
 }

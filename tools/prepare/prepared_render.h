@@ -23,6 +23,10 @@ struct PreparedRender {
 PreparedRender prepareRender(const SceneChoice& scene, const Settings& settings, CombineChoice& combine,
                              const RenderExtent& extent);
 
+// The same of a scene that is open already.
+PreparedRender prepareRender(OpenedScene opened, const Settings& settings, CombineChoice& combine,
+                             const RenderExtent& extent);
+
 // A session whose states and images say what they are of. Throws Error(OutOfMemory) where the plan needs too much.
 std::unique_ptr<Session> beginSession(const PreparedRender& render, const SceneChoice& scene);
 

@@ -10,22 +10,24 @@ namespace braid {
 // Seconds since the process started, loading of its libraries included.
 double processSeconds();
 
-// A limit of the whole process; none where `seconds` is 0.
+// A limit of the whole process, or of what began at `began` by its clock; none where `seconds` is 0.
 class TimeLimit {
  public:
   // What an image that is being combined may take beyond the limit before it is given up: nearly done, it is worth
   // more than the seconds.
   static constexpr double kGrace = 0.75, kGraceShare = 0.02;
 
-  explicit TimeLimit(double seconds = 0) : seconds_(seconds) {}
+  explicit TimeLimit(double seconds = 0, double began = 0) : seconds_(seconds), began_(began) {}
   bool exists() const { return seconds_ > 0; }
   double seconds() const { return seconds_; }
   // Seconds from now, negative when it is over; infinite without a limit.
-  double left() const { return exists() ? seconds_ - processSeconds() : std::numeric_limits<double>::infinity(); }
+  double left() const {
+    return exists() ? began_ + seconds_ - processSeconds() : std::numeric_limits<double>::infinity();
+  }
   double grace() const { return std::max(kGrace, kGraceShare * seconds_); }
 
  private:
-  double seconds_;
+  double seconds_, began_;
 };
 
 // Where the seconds of a render went; one after the other, so that they add up to `total`.

@@ -3,6 +3,7 @@
 // left out is told once a kind, with its JSON pointer. LoadOptions::strict refuses a file for any problem instead.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,5 +32,20 @@ struct LoadOptions {
 // extensionsRequired that braid does not know. Warnings go to data.warnings and to the sink; flaws of what the picture
 // does not use to data.notes.
 SceneData loadGltf(const std::string& path, const LoadOptions& options = {}, const LogSink& log = {});
+
+// A file that stays in memory to be posed many times: it is read and checked, and its images are decoded, once.
+class SceneFile {
+ public:
+  // As loadGltf(). The options' frameTime only says whether there will be one.
+  explicit SceneFile(const std::string& path, const LoadOptions& options = {}, const LogSink& log = {});
+  ~SceneFile();
+
+  // What loadGltf() returns with this frameTime, to the bit. The sink hears each warning once.
+  SceneData pose(std::optional<float> frameTime);
+
+ private:
+  struct Opened;
+  std::unique_ptr<Opened> opened_;
+};
 
 }  // namespace braid

@@ -3,6 +3,7 @@
 #include "renderer/scene/data/gltf.h"
 
 #include <algorithm>
+#include <set>
 
 #include "renderer/scene/gltf/document/gltf_document.h"
 #include "renderer/scene/gltf/gltf_material.h"
@@ -47,32 +48,71 @@ SceneData describe(const Document& document) {
 
 }  // namespace
 
-SceneData loadGltf(const std::string& path, const LoadOptions& options, const LogSink& log) {
+struct SceneFile::Opened {
   Document document;
+  LogSink log;
+  std::set<std::string> told;
+  // What poses change, as the file has it.
+  std::vector<tinygltf::Node> nodes;
+  Report report;
+  Usage usage;
+  ContentHash hash;
+
+  void restore() {
+    document.model.nodes = nodes;
+    document.report = report;
+    document.usage = usage;
+    document.hash = hash;
+  }
+  void tell(const std::vector<std::string>& warnings) {
+    for (const std::string& line : warnings)
+      if (log && told.insert(line).second) log(LogLevel::Warning, document.path + ": " + line);
+  }
+};
+
+SceneFile::SceneFile(const std::string& path, const LoadOptions& options, const LogSink& log)
+    : opened_(std::make_unique<Opened>()) {
+  Document& document = opened_->document;
   document.options = options;
   readDocument(document, path);
   resolveViews(document);
   readMaterials(document);
   readCamerasAndLights(document);
   validate(document);
+  opened_->log = log;
+  opened_->nodes = document.model.nodes;
+  opened_->report = document.report;
+  opened_->usage = document.usage;
+  opened_->hash = document.hash;
+}
+
+SceneFile::~SceneFile() = default;
+
+SceneData SceneFile::pose(std::optional<float> frameTime) {
+  opened_->restore();
+  Document& document = opened_->document;
+  document.options.frameTime = frameTime;
+  const LoadOptions& options = document.options;
   SceneData scene = describe(document);
   MaterialTable materials(document, scene, options.doubleSided);
   buildScene(document, options, materials, scene);
   materials.loadTextures();
-  if (options.strict) document.report.throwIfBroken(path);
+  if (options.strict) document.report.throwIfBroken(document.path);
   // A file that never had a surface is no flaw; one that lost them all has nothing to show.
   if (scene.instances.empty()) {
-    document.report.throwIfBroken(path, &document.usage);
-    document.report.throwIfBroken(path);
+    document.report.throwIfBroken(document.path, &document.usage);
+    document.report.throwIfBroken(document.path);
   }
   addDefaults(scene, options, document.report);
   scene.contentHash = document.hash.value();
   scene.warnings = document.report.lines(document.usage, true);
   scene.notes = document.report.lines(document.usage, false);
-  if (log) {
-    for (const std::string& line : scene.warnings) log(LogLevel::Warning, path + ": " + line);
-  }
+  opened_->tell(scene.warnings);
   return scene;
+}
+
+SceneData loadGltf(const std::string& path, const LoadOptions& options, const LogSink& log) {
+  return SceneFile(path, options, log).pose(options.frameTime);
 }
 
 }  // namespace braid

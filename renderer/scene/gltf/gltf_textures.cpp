@@ -57,13 +57,6 @@ void dropUnreadTextures(Material& m) {
   });
 }
 
-struct DecodedImage {
-  std::vector<uint8_t> file;  // of an external image
-  Bytes encoded;
-  std::shared_ptr<const Image> image;
-  std::string problem, note;
-};
-
 // Small files can hold huge empty pictures: bounds what all of them together may take.
 class PixelBudget {
  public:
@@ -173,7 +166,8 @@ std::vector<int> MaterialTable::usedImages() const {
 }
 
 void MaterialTable::loadTextures() {
-  std::vector<DecodedImage> decoded(document_.images.size());
+  std::vector<DecodedImage>& decoded = document_.decoded;
+  decoded.resize(document_.images.size());
   // Two entries for one file or view share its pixels.
   std::map<std::pair<std::string_view, int>, int> firstOf;
   std::vector<int> unique;
@@ -187,10 +181,11 @@ void MaterialTable::loadTextures() {
   PixelBudget budget(document_.sourceBytes);
   parallelFor(unique.size(), [&](size_t i) {
     const auto image = static_cast<size_t>(unique[i]);
-    decode(document_, document_.images[image], budget, decoded[image]);
+    if (!decoded[image].done) decode(document_, document_.images[image], budget, decoded[image]);
+    decoded[image].done = true;
   });
   for (const int image : unique) {
-    DecodedImage& item = decoded[static_cast<size_t>(image)];
+    const DecodedImage& item = decoded[static_cast<size_t>(image)];
     const std::string place = "/images/" + std::to_string(image);
     if (!item.problem.empty()) document_.report.problem(place, item.problem, "factors alone are used");
     if (!item.note.empty()) document_.report.problem(place, item.note, "that file is read");
@@ -199,7 +194,6 @@ void MaterialTable::loadTextures() {
                                        " values are not finite, negative or above 1e18; they are limited");
     if (item.image && document_.images[static_cast<size_t>(image)].view < 0)
       document_.hash.add(item.encoded.data(), item.encoded.size());
-    item.file = {};
   }
   scene_.textures.resize(textures_.size());
   for (const auto& [key, number] : textures_) {

@@ -156,8 +156,9 @@ TEST_CASE("Flamenco's job type makes tasks of which the last depends on all othe
   };
   if (!has("node")) {
     MESSAGE("no node: the script's data are checked, and its code is not run");
-    std::vector<Json> steps = data["shares"];
-    steps.push_back(data["merge"]);
+    REQUIRE(data["images"].size() == 1);
+    std::vector<Json> steps = data["images"][0]["shares"];
+    steps.push_back(data["images"][0]["merge"]);
     for (const Json& step : steps) {
       Words args{"-C", data["folder"], data["program"]};
       for (const std::string a : step["args"]) args.push_back(a);

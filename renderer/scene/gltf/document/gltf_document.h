@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <span>
@@ -49,6 +50,15 @@ struct ImageSource {
   int view = -1;
 };
 
+// The pixels of an image, from when they are first needed.
+struct DecodedImage {
+  bool done = false;
+  std::vector<uint8_t> file;  // of an external image
+  Bytes encoded;
+  std::shared_ptr<const Image> image;
+  std::string problem, note;
+};
+
 struct Document {
   std::string path;
   LoadOptions options;
@@ -58,8 +68,9 @@ struct Document {
   std::set<int> bareBuffers;  // those that name no data
   std::vector<View> views;
   std::vector<ImageSource> images;
-  std::vector<Material> materials;  // texture references hold the indices and uv sets of the file
-  std::vector<CameraData> cameras;  // both without their nodes' transforms
+  std::vector<DecodedImage> decoded;  // of the images, or still empty
+  std::vector<Material> materials;    // texture references hold the indices and uv sets of the file
+  std::vector<CameraData> cameras;    // both without their nodes' transforms
   std::vector<PunctualLight> lights;
   std::vector<int> parents;  // of the nodes
   // Accessors that primitives name but that cannot be read.
