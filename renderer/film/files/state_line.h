@@ -16,7 +16,7 @@
 namespace braid {
 
 // A word without spaces; the empty one is "%".
-inline std::string escaped(const std::string& text) {
+inline std::string escapedWord(const std::string& text) {
   if (text.empty()) return "%";
   std::string out;
   for (const char c : text) {

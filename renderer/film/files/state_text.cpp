@@ -13,10 +13,10 @@ namespace braid {
 namespace {
 
 std::string attributeLine(const Attribute& a) {
-  std::string line = fmt::format("attribute {} {}", static_cast<int>(a.kind), escaped(a.name));
+  std::string line = fmt::format("attribute {} {}", static_cast<int>(a.kind), escapedWord(a.name));
   switch (a.kind) {
     case Attribute::Kind::String:
-      return line + ' ' + escaped(a.text);
+      return line + ' ' + escapedWord(a.text);
     case Attribute::Kind::Int:
       return line + fmt::format(" {}", static_cast<uint64_t>(a.integer));
     case Attribute::Kind::Float:
@@ -30,9 +30,10 @@ std::string attributeLine(const Attribute& a) {
 
 std::string estimateLines(const EstimateState& e) {
   const Accumulator& sums = e.sums;
-  std::string text = fmt::format("estimate {} {:d} {} {:d} {} {} {} {} {:d} {:d}\ncounts", escaped(e.name), e.unbiased,
-                                 static_cast<int>(e.correlation), e.lowDiscrepancy, e.passesPerRound, e.seconds,
-                                 sums.rejected(), sums.clampedSplats(), sums.keepsBias(), e.parts.has_value());
+  std::string text =
+      fmt::format("estimate {} {:d} {} {:d} {} {} {} {} {:d} {:d}\ncounts", escapedWord(e.name), e.unbiased,
+                  static_cast<int>(e.correlation), e.lowDiscrepancy, e.passesPerRound, e.seconds, sums.rejected(),
+                  sums.clampedSplats(), sums.keepsBias(), e.parts.has_value());
   for (int k = 0; k < sums.bucketCount(); ++k) text += fmt::format(" {}", sums.passesInBucket(k));
   text += "\npasses";
   for (const PassInterval& i : e.passes) text += fmt::format(" {}:{}", i.begin, i.end);
@@ -73,18 +74,19 @@ std::vector<PlaneEntry> planeTable(const FilmState& state) {
 }
 
 std::string stateHeader(const FilmState& s) {
-  std::string text = fmt::format(
-      "braid {} {} {}\nscene {}\nseed {}\npixels {} {} {} {} {} {}\nbuckets {}\nseconds {}\n",
-      escaped(s.identity.version), escaped(s.identity.build), escaped(s.identity.isa), hexString(s.identity.sceneHash),
-      s.seed, s.fullWidth, s.fullHeight, s.window.x0, s.window.y0, s.window.x1, s.window.y1, s.buckets, s.seconds);
+  std::string text =
+      fmt::format("braid {} {} {}\nscene {}\nseed {}\npixels {} {} {} {} {} {}\nbuckets {}\nseconds {}\n",
+                  escapedWord(s.identity.version), escapedWord(s.identity.build), escapedWord(s.identity.isa),
+                  hexString(s.identity.sceneHash), s.seed, s.fullWidth, s.fullHeight, s.window.x0, s.window.y0,
+                  s.window.x1, s.window.y1, s.buckets, s.seconds);
   for (const StateOption& o : s.identity.options)
-    text += fmt::format("option {} {}\n", escaped(o.name), escaped(o.value));
+    text += fmt::format("option {} {}\n", escapedWord(o.name), escapedWord(o.value));
   for (const Attribute& a : s.attributes) text += attributeLine(a) + '\n';
   for (const EstimateState& e : s.estimates) text += estimateLines(e);
   if (s.features) text += fmt::format("features {} {}\n", s.features->passesInHalf(0), s.features->passesInHalf(1));
   if (s.coverage) text += fmt::format("coverage {}\n", s.coverage->passes());
   for (const PlaneEntry& p : planeTable(s))
-    text += fmt::format("plane {} {}\n", escaped(p.name), p.sum ? "float64" : "float32");
+    text += fmt::format("plane {} {}\n", escapedWord(p.name), p.sum ? "float64" : "float32");
   return text;
 }
 
