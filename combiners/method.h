@@ -134,6 +134,7 @@ struct MemoryCase {
   int photonMaps = 0;        // of which so many are biased estimates
   bool photonMap = false;    // whether the biased input is one
   bool denoiseHalf = false;  // whether there is MethodInputs::denoiseHalf
+  bool learned = false;      // whether kpn can run, which some methods use by themselves
 };
 
 // Bytes a pixel. The inputs are not counted.

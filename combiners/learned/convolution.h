@@ -65,6 +65,9 @@ class ConvolutionLibrary {
 // Opened by the first call. Null: it cannot be, and `reason` is a sentence that says why.
 const ConvolutionLibrary* openConvolutions(std::string& reason);
 
+// Whether there is a file to open: false, and why, without opening it.
+bool convolutionsInstalled(std::string& reason);
+
 // What the module exports; null: it is of another version of braid.
 inline constexpr const char* kConvolutionModuleEntry = "braidConvolutions";
 using ConvolutionModuleEntry = const ConvolutionLibrary* (*)(const char* version);

@@ -27,9 +27,7 @@ struct Opened {
 
 Opened openModule() {
   const fs::path path = convolutionModule();
-  std::error_code ignored;
-  if (!fs::exists(path, ignored))
-    return {nullptr, path.string() + ", which runs networks, does not exist: build braid where oneDNN is installed"};
+  if (std::string reason; !convolutionsInstalled(reason)) return {nullptr, reason};
   void* module = ::dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (!module) return {nullptr, path.string() + ", which runs networks, cannot be opened: " + ::dlerror()};
   const auto entry = reinterpret_cast<ConvolutionModuleEntry>(::dlsym(module, kConvolutionModuleEntry));
@@ -38,6 +36,14 @@ Opened openModule() {
 }
 
 }  // namespace
+
+bool convolutionsInstalled(std::string& reason) {
+  const fs::path path = convolutionModule();
+  std::error_code ignored;
+  if (fs::exists(path, ignored)) return true;
+  reason = path.string() + ", which runs networks, does not exist: build braid where oneDNN is installed";
+  return false;
+}
 
 const ConvolutionLibrary* openConvolutions(std::string& reason) {
   static const Opened opened = openModule();

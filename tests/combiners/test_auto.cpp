@@ -6,9 +6,12 @@
 #include <doctest/doctest.h>
 
 #include "combiners/shrinkage/fused_estimate.h"
+#include "combiners/pipeline/external_method.h"
+#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/pipeline.h"
 #include "tests/combiners/auto_cases.h"
 #include "tests/support/combiner_fixture.h"
+#include "tests/support/without_kpn.h"
 
 namespace braid::test_auto {
 
@@ -97,6 +100,7 @@ TEST_CASE("A denoiser whose image is worse than its halves show is not believed"
 }
 
 TEST_CASE("auto measures from two passes on, and makes a picture of one") {
+  const WithoutKpn same;
   for (const uint64_t passes : {1, 2, 3}) {
     const Case c = noisyCase(passes);
     const Estimates e = kept(c, {"pt"});
@@ -109,6 +113,17 @@ TEST_CASE("auto measures from two passes on, and makes a picture of one") {
                                     [](const NamedPlane& p) { return p.name == "weight.auto.pw-wide"; });
     CHECK(weighs);
   }
+}
+
+TEST_CASE("Of one pass auto takes kpn's image where it runs") {
+  if (!dynamic_cast<const ExternalMethod&>(*findMethod("kpn")).skipReason().empty()) return;
+  const Case c = noisyCase(1);
+  const Estimates e = kept(c, {"pt"});
+  const PipelineResult both = runPipeline(e, {"auto", "kpn"}, {});
+  REQUIRE(both.find("auto")->ran());
+  REQUIRE(both.find("kpn")->ran());
+  CHECK(relativeError(both.find("auto")->result.image.mean, c.truth) <
+        1.05 * relativeError(both.find("kpn")->result.image.mean, c.truth));
 }
 
 TEST_CASE("Of one pass auto takes the named denoiser's image, for nothing can judge it") {

@@ -7,6 +7,7 @@
 #include "combiners/pipeline/pipeline.h"
 #include "combiners/pipeline/pipeline_memory.h"
 #include "combiners/pipeline/registry.h"
+#include "tests/support/without_kpn.h"
 #include "tests/support/combiner_fixture.h"
 #include "tests/support/counted_memory.h"
 
@@ -86,6 +87,7 @@ void checkMemory(const Method& method, const Case& c, const std::vector<const ch
 }  // namespace
 
 TEST_CASE("every method states its memory to 10 %") {
+  const WithoutKpn same;
   const std::vector<std::vector<const char*>> baseSets{
       {}, {"narrow"}, {"narrow", "wide"}, {"sppm"}, {"sppm", "narrow"}, {"sppm", "narrow", "wide", "narrow"}};
   for (const uint64_t samples : {2u, 16u, 64u}) {
@@ -107,6 +109,7 @@ TEST_CASE("every method states its memory to 10 %") {
 }
 
 TEST_CASE("auto states its memory where it filters direct and indirect light apart") {
+  const WithoutKpn same;
   const std::shared_ptr<const Method> method = findMethod("auto");
   for (const uint64_t samples : {2u, 16u, 64u}) {
     const Case c = withDirectIndirect(caseOf(samples));
@@ -119,6 +122,7 @@ TEST_CASE("auto states its memory where it filters direct and indirect light apa
 }
 
 TEST_CASE("the pipeline takes the memory that follows from a combine plan") {
+  const WithoutKpn same;
   Case c = withDirectIndirect(caseOf(16));
   c.estimates.reference = c.truth;
   const AvailableEstimates available = availableIn(c.estimates);

@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "renderer/session/rendering_revision.h"
+#include "tests/support/without_kpn.h"
 #include "tests/support/render_fixture.h"
 #include "tools/images/exr_metadata.h"
 #include "tools/prepare/prepared_render.h"
@@ -67,6 +68,7 @@ Pixels rendered(const std::string& scene, const std::string& integrator, const s
 }
 
 Renders renders() {
+  const test::WithoutKpn same;
   Renders all;
   for (const Integrator* i : test::integrators())
     all[fmt::format("cornell {}", i->name())] = rendered("cornell", i->name());

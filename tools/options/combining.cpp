@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "braid/plan_combining.h"
+#include "combiners/denoise/kpn/kpn_network.h"
 #include "combiners/denoise/oidn/oidn_networks.h"
 #include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/denoise_cutoff.h"
@@ -83,6 +84,11 @@ void addCombineOptions(CLI::App& command, CombineChoice& c) {
                                         "Folder of the weights of oidn, which are preferred to its library then "
                                         "(default: BRAID_OIDN_WEIGHTS, or where tools/setup oidn puts them)")
       ->type_name("FOLDER")
+      ->group(kMethodOptions);
+  command
+      .add_option_function<std::string>("--kpn-network", nameKpnNetwork,
+                                        "Network of kpn (default: BRAID_KPN_NETWORK, or the one that comes with braid)")
+      ->type_name("FILE")
       ->group(kMethodOptions);
 }
 

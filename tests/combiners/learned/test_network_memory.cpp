@@ -4,7 +4,10 @@
 #include "combiners/denoise/oidn/oidn.h"
 #include "combiners/denoise/oidn/oidn_unet.h"
 #include "combiners/learned/tiled_network.h"
+#include "combiners/pipeline/external_method.h"
+#include "combiners/pipeline/method_names.h"
 #include "renderer/core/parallel.h"
+#include "tests/support/combiner_fixture.h"
 #include "tests/support/counted_memory.h"
 #include "tests/support/gltf_fixture.h"
 #include "tests/combiners/learned/plain_network.h"
@@ -60,6 +63,31 @@ TEST_CASE("oidn takes no more memory than it states, and not much less where ima
     // Every tile of this image is at its border, and the heap of oneDNN, which holds the weights, is not counted.
     CHECK(peak > 0.8 * (pixels * stated.peak + each));
     CHECK(static_cast<double>(heapBytes() - before) == doctest::Approx(pixels * stated.kept).epsilon(0.1));
+  }
+}
+
+TEST_CASE("kpn, and auto with it, take no more memory than they state") {
+  const std::shared_ptr<const Method> kpn = findMethod("kpn");
+  if (!oneDnn() || !dynamic_cast<const ExternalMethod&>(*kpn).skipReason().empty()) return;
+  const Case c = makeCase(sized(1000, 600, 4));
+  const MethodInputs in = inputsOf(c);
+  const auto pixels = static_cast<double>(c.pt().mean.size());
+  MemoryCase of;
+  of.passes = 4;
+  of.learned = true;
+  for (const std::shared_ptr<const Method>& method : {findMethod("kpn"), findMethod("auto")}) {
+    const MethodMemory stated = method->memory(of);
+    const auto each = static_cast<double>(stated.eachThread);
+    for (const int threads : {1, 2}) {
+      const int64_t before = heapBytes();
+      resetHeapPeak();
+      MethodResult result;
+      withThreads(threads, [&] { result = method->run(in); });
+      const auto peak = static_cast<double>(heapPeak() - before);
+      INFO(method->name(), " on ", threads, " threads: ", (peak - each) / pixels, " bytes a pixel");
+      CHECK(peak < 1.1 * (pixels * stated.peak + threads * each));
+      CHECK(peak > 0.7 * (pixels * stated.peak + each));
+    }
   }
 }
 

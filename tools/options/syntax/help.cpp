@@ -63,7 +63,8 @@ std::string methodText(const CLI::App& command, const Method& method) {
     if (const CLI::Option* o = command.get_option_no_throw("--" + info.name)) text += helpEntry(*o, true);
   // What is no number: a folder that it reads.
   for (const CLI::Option* o : optionsOf(command, kMethodOptions))
-    if (o->get_type_name() == "FOLDER" && o->get_name().starts_with(fmt::format("--{}-", method.name())))
+    if ((o->get_type_name() == "FOLDER" || o->get_type_name() == "FILE") &&
+        o->get_name().starts_with(fmt::format("--{}-", method.name())))
       text += helpEntry(*o, true);
   return text;
 }

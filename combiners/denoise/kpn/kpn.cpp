@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// Kernel prediction: a network chooses how far each pixel averages its neighbours, at several scales.
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "combiners/denoise/kpn/kpn_network.h"
+#include "combiners/pipeline/external_method.h"
+#include "combiners/pipeline/pipeline.h"
+#include "combiners/pipeline/registry.h"
+#include "combiners/statistics/variance.h"
+#include "renderer/core/error.h"
+#include "renderer/film/make_attribute.h"
+
+namespace braid {
+
+namespace {
+
+const OptionInfo kPlanes{"kpn-planes", 0, "1: the image stays as it is; --weights writes what the network would read"};
+
+// With halves of their own weights, but features and variances of all samples, like those of pw.
+class Kpn : public ExternalMethod {
+ public:
+  const char* name() const override { return "kpn"; }
+  const char* description() const override {
+    return "Kernel prediction: a network of braid's own chooses whom each pixel averages, at six scales";
+  }
+  MethodKind kind() const override { return MethodKind::Denoiser; }
+  Needs needs() const override {
+    Needs needs;
+    needs.passes = 1;
+    needs.helpful.features = needs.helpful.featureNoise = true;
+    needs.halves = false;
+    return needs;
+  }
+  std::vector<OptionInfo> options() const override { return {kPlanes}; }
+  MethodMemory memory(const MemoryCase& /*of*/) const override {
+    constexpr uint64_t kWeights = uint64_t(4) << 20;
+    MethodMemory memory{260, 36};
+    memory.eachThread = kTileBytes + kConvolutionScratch + kWeights;
+    return memory;
+  }
+  std::string skipReason() const override;
+  MethodResult run(const MethodInputs& in) const override;
+};
+
+std::string Kpn::skipReason() const {
+  const std::string file = findKpnNetwork();
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) return file + ": there is no such network";
+  std::string reason;
+  return convolutionsInstalled(reason) ? "" : reason;
+}
+
+MethodResult planesOf(const MethodInputs& in, KpnPlanes planes) {
+  MethodResult result;
+  result.image.mean = in.unbiased->mean;
+  result.remarks.push_back(numberAttribute("kpn-exposure", in.options.number(kPipelineExposure)));
+  for (size_t k = 0; k < planes.input.size(); ++k)
+    result.aovs.push_back({fmt::format("kpn.{:02}", k), std::move(planes.input[k])});
+  result.aovs.push_back({"kpn.variance", std::move(planes.variance)});
+  return result;
+}
+
+MethodResult Kpn::run(const MethodInputs& in) const {
+  const Estimate& e = *in.unbiased;
+  const KpnScene scene{in.features, regularisedVariance(e), in.firstPass ? 1 : e.passes};
+  if (scene.variance.empty())
+    throw Error(ExitCode::BadInput, "kpn needs the variance of its input, or the halves of at least two passes");
+  if (in.options.number(kPlanes) != 0) return planesOf(in, kpnPlanes(e.mean, scene, false));
+  std::string reason;
+  const ConvolutionLibrary* library = openConvolutions(reason);
+  if (!library) throw Error(ExitCode::Usage, reason);
+  KpnNetwork network(findKpnNetwork(), *library);
+  MethodResult result;
+  result.image.mean = network.denoise(kpnPlanes(e.mean, scene, false), in.cancel);
+  for (int h = 0; h < 2; ++h)
+    if (!in.meanOnly && !e.half[h].empty() && !in.cancelled())
+      result.image.half[h] = network.denoise(kpnPlanes(e.half[h], scene, true), in.cancel);
+  return result;
+}
+
+}  // namespace
+
+std::unique_ptr<Method> make_kpn() { return std::make_unique<Kpn>(); }
+
+}  // namespace braid

@@ -1,0 +1,127 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Training data: views of random scenes, as the network sees them at few samples, and what they should become.
+
+    python3 tools/train/data.py FIRST END FOLDER [--braid PROGRAM] [--size WxH] [--target SAMPLES]
+
+Renders three views of each scene from FIRST to before END (tools/train/scenes.py) and writes FOLDER/SCENE_VIEW.npz. A
+view that is there is left alone, so that an interrupted run goes on, and several can share a folder. The target is what
+`auto` makes of the samples named: ten times nearer to the truth than they are, and unbiased enough for inputs of a few.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+import OpenImageIO as oiio
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+
+# Of each view one of each group, so that every scene is seen at few and at many samples.
+SAMPLES = ((1, 2), (4, 4, 8), (16, 32))
+PLANES = 18  # kKpnPlanes
+
+
+def read(path):
+    """The channels of an EXR by name."""
+    image = oiio.ImageInput.open(path)
+    if image is None:
+        raise SystemExit(f"{path}: {oiio.geterror()}")
+    spec = image.spec()
+    pixels = image.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
+    exposure = spec.getattribute("braid/kpn/kpn-exposure")
+    return {name: pixels[..., k] for k, name in enumerate(spec.channelnames)}, exposure
+
+
+def rgb(channels, layer):
+    return np.stack([channels[(layer + "." if layer else "") + c] for c in "RGB"])
+
+
+def half(values):
+    return np.clip(np.nan_to_num(values), -6e4, 6e4).astype(np.float16)
+
+
+def inputs(channels):
+    """The planes of the network and log2 of the variance: what kpn reads (combiners/denoise/kpn/kpn_planes.h)."""
+    planes = [channels[f"kpn.{k:02}.Y"] for k in range(PLANES)]
+    planes.append(np.log2(channels["kpn.variance.Y"] + 2.0**-40))
+    return half(np.stack(planes))
+
+
+class Renderer:
+    def __init__(self, options, folder):
+        self.program, self.size, self.target, self.folder = options.braid, options.size, options.target, folder
+
+    def render(self, scene, camera, more, samples, seed, name):
+        out = os.path.join(self.folder, name)
+        call = [self.program, "render", scene["file"], "-o", out, "--integrator", "pt", "--spp", str(samples), "--seed",
+                str(seed), "--size", self.size, "--look-at", camera["look_at"], "--yfov", str(camera["yfov"]),
+                "--threads", "1", "-q", "--float", "--aovs", "all"] + scene["options"] + more
+        done = subprocess.run(call, stderr=subprocess.PIPE, text=True)
+        if done.returncode:
+            raise RuntimeError(done.stderr.strip())
+        return out
+
+    def planes(self, image):
+        out = os.path.join(self.folder, "planes.exr")
+        subprocess.run([self.program, "combine", "--unbiased", image, "--method", "kpn", "--kpn-planes", "1", "--weights",
+                        "--float", "-q", "-o", out], check=True, stderr=subprocess.DEVNULL)
+        return read(out)
+
+    def view(self, scene, camera, seed, view):
+        """Planes and target of each number of samples, or None where there is nothing to see."""
+        target, _ = read(self.render(scene, camera, ["--combine", "auto"], self.target, 7000 + seed, "target.exr"))
+        truth = rgb(target, "")
+        if not truth.mean() > 1e-4 or np.median(truth.std(axis=(1, 2))) < 0.02 * truth.mean():
+            return None
+        arrays, chosen = {}, []
+        for group, candidates in enumerate(SAMPLES):
+            samples = candidates[(seed + view) % len(candidates)]
+            image = self.render(scene, camera, ["--combine", "none"], samples, 10 * seed + group, "image.exr")
+            channels, exposure = self.planes(image)
+            arrays[f"x{group}"] = inputs(channels)
+            arrays[f"exposure{group}"] = np.float32(exposure)
+            chosen.append(samples)
+        return {"target": truth.astype(np.float32), "samples": np.array(chosen), **arrays}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("first", type=int)
+    parser.add_argument("end", type=int)
+    parser.add_argument("folder")
+    parser.add_argument("--braid", default="tools/braid")
+    parser.add_argument("--size", default="192x128")
+    parser.add_argument("--target", type=int, default=96)
+    options = parser.parse_args()
+    import scenes  # reads the repository's generator
+
+    os.makedirs(options.folder, exist_ok=True)
+    for seed in range(options.first, options.end):
+        names = [os.path.join(options.folder, f"{seed:05}_{view}.npz") for view in range(3)]
+        if all(os.path.exists(name) for name in names):
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            scene = scenes.make(seed, folder)
+            scene["file"] = os.path.join(folder, f"{seed}.glb")
+            renderer = Renderer(options, folder)
+            for view, camera in enumerate(scene["cameras"][:3]):
+                if os.path.exists(names[view]):
+                    continue
+                try:
+                    arrays = renderer.view(scene, camera, seed, view)
+                except RuntimeError as error:
+                    print(json.dumps({"scene": seed, "view": view, "error": str(error)}), flush=True)
+                    continue
+                if arrays is not None:
+                    np.savez(names[view] + ".part.npz", **arrays)
+                    os.replace(names[view] + ".part.npz", names[view])
+                print(json.dumps({"scene": seed, "view": view, "kind": scene["kind"], "kept": arrays is not None}), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,34 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Relative squared errors of trained weights on views that training has not seen.
+
+    python3 tools/train/evaluate.py DATA WEIGHTS.pt [WEIGHTS.pt ...]
+
+Prints, for each file, the geometric mean over the views by number of samples; first that of the samples themselves.
+"""
+
+import glob
+import os
+import sys
+
+import numpy as np
+import torch
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from network import KernelPrediction
+from train import validated
+
+
+def main():
+    if len(sys.argv) < 3:
+        raise SystemExit(__doc__)
+    views = [(name, np.load(name)) for name in sorted(glob.glob(os.path.join(sys.argv[1], "*.npz")))]
+    print("samples", validated(lambda planes, irradiance, variance: irradiance, views))
+    for path in sys.argv[2:]:
+        model = KernelPrediction()
+        model.load_state_dict(torch.load(path)["model"])
+        print(path, validated(model, views))
+
+
+if __name__ == "__main__":
+    main()
