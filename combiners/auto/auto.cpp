@@ -280,6 +280,7 @@ void AutoRun::filter() {
   if (std::optional<Estimate> learned = isOn(kLearned) && !isNamed("kpn") ? learnedFilter(*x_, in_) : std::nullopt) {
     filters_.push_back(std::move(*learned));
     learned_ = true;
+    result_.remarks.push_back(textAttribute("learned", "kpn"));
   }
   if (own.empty()) own = autoFilters(*x_, in_.features, in_.cancel);
   for (Estimate& e : own) filters_.push_back(std::move(e));
