@@ -18,7 +18,7 @@ namespace braid {
 
 namespace {
 
-constexpr double kMebibyte = 1048576.0;
+constexpr double kBytesPerMebibyte = 1048576.0;
 constexpr uint64_t kProgram = uint64_t(140) << 20;  // code and data of braid and the libraries that it opens
 
 // OpenEXR holds a few copies of the rows that it compresses.
@@ -50,7 +50,7 @@ std::string MemoryPlan::text() const {
   std::string text = fmt::format("memory: {} at most", mebibytes(total()));
   const char* separator = ": ";
   for (const MemoryItem& item : sorted) {
-    if (item.bytes < static_cast<uint64_t>(kMebibyte / 10)) break;
+    if (item.bytes < static_cast<uint64_t>(kBytesPerMebibyte / 10)) break;
     text += fmt::format("{}{} {}", separator, item.use, mebibytes(item.bytes));
     separator = ", ";
   }
