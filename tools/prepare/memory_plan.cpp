@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "braid/plan_combining.h"
+#include "combiners/denoise/kpn/kpn_network.h"
 #include "combiners/pipeline/pipeline_memory.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
@@ -59,7 +60,9 @@ std::string MemoryPlan::text() const {
   return text + '\n';
 }
 
-MemoryPlan planMemory(const Scene& scene, const Plan& plan, const CombinePlan& combinePlan, uint64_t samples) {
+namespace {
+
+MemoryPlan memoryOf(const Scene& scene, const Plan& plan, const CombinePlan& combinePlan, uint64_t samples) {
   const auto pixels = static_cast<uint64_t>(plan.window.width()) * static_cast<uint64_t>(plan.window.height());
   const AvailableEstimates available = plannedEstimates(plan, samples);
   const MemoryItem film{"film", pixels * (plan.filmBytesPerPixel + historyBytes(available))};
@@ -86,6 +89,16 @@ MemoryPlan planMemory(const Scene& scene, const Plan& plan, const CombinePlan& c
   memory.items.push_back(copy);
   memory.items.push_back(combining.bytes > writing.bytes ? combining : writing);
   return memory;
+}
+
+}  // namespace
+
+// Networks take a hundred megabytes a thread: where they do not fit, auto does without kpn.
+MemoryPlan planMemory(const Scene& scene, const Plan& plan, const CombinePlan& combinePlan, uint64_t samples) {
+  MemoryPlan memory = memoryOf(scene, plan, combinePlan, samples);
+  if (memory.total() <= memoryLimit()) return memory;
+  nameKpnNetwork("left out within --memory-limit");
+  return memoryOf(scene, plan, combinePlan, samples);
 }
 
 void requireWithinLimit(const MemoryPlan& plan) {
