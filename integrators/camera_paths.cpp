@@ -16,7 +16,10 @@ Camera::CameraRay cameraRayThrough(const Plan& plan, const SampleBlock& camera, 
 
 void surfaceFeatures(const Scene& scene, const Hit& hit, const Bsdf& bsdf, float distance, FeatureSample& features) {
   Spectrum albedo = bsdf.albedo();
-  if (hit.material->emissive()) albedo += scene.emission(*hit.mesh, hit.triangle, hit.u, hit.v);
+  // White as far as its texture shines, however strong it is: no unit of light changes what filters see.
+  if (hit.material->emissive())
+    albedo +=
+        maxComponent(scene.emission(*hit.mesh, hit.triangle, hit.u, hit.v)) / maxComponent(hit.material->emission);
   features.setAlbedo(albedo);
   features.normal = hit.frame.n;
   features.depth = distance;
