@@ -35,7 +35,7 @@ if(BRAID_SANITIZE)
   list(FILTER test_sources INCLUDE REGEX "/test_${sanitized}[^/]*\\.cpp$")
   braid_test_program(braid_loading_tests SOURCES ${loading_sources} tests/fuzz/targets.cpp
                      braid/braid.cpp tools/bench/builtin_scenes.cpp tools/images/braid_image.cpp tools/images/estimates_file.cpp tools/images/foreign_image.cpp tools/images/same_view.cpp
-                     combiners/denoise/oidn/oidn_unet.cpp combiners/learned/network.cpp combiners/learned/tza.cpp
+                     combiners/denoise/oidn/oidn_unet.cpp combiners/learned/network.cpp combiners/learned/tza.cpp combiners/learned/weights_file.cpp
                      combiners/pipeline/exposure.cpp combiners/pipeline/invalid_pixels.cpp combiners/pipeline/spatial_variance.cpp
                      combiners/statistics/surface_smooth.cpp BOXES braid_integrators)
   braid_test_program(braid_tests SOURCES ${test_sources} BOXES braid_tools)

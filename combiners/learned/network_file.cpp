@@ -3,14 +3,11 @@
 
 #include <cmath>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <system_error>
 
-#include <half.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "combiners/learned/weights_file.h"
 #include "renderer/core/error.h"
 
 namespace braid {
@@ -112,15 +109,11 @@ int Parser::inputChannels(const NetworkLayer& layer) const {
 }
 
 std::vector<float> Parser::values(size_t count, const std::string& layer) {
-  if (count * sizeof(uint16_t) > file_.size() - at_) fail(layer + ": its values are not all in the file");
-  std::vector<float> out(count);
-  for (float& value : out) {
-    Imath::half half;
-    std::memcpy(&half, file_.data() + at_, sizeof half);
-    at_ += sizeof half;
-    value = half;
-    if (!std::isfinite(value)) fail(layer + ": a value that is not finite");
-  }
+  const size_t bytes = count * sizeof(uint16_t);
+  if (bytes > file_.size() - at_) fail(layer + ": its values are not all in the file");
+  std::vector<float> out = fromHalves(file_.subspan(at_, bytes));
+  at_ += bytes;
+  if (!areFinite(out)) fail(layer + ": a value that is not finite");
   return out;
 }
 
@@ -165,16 +158,7 @@ NetworkFile parseNetworkFile(std::span<const uint8_t> file, const std::string& p
 }
 
 NetworkFile readNetworkFile(const std::string& path) {
-  std::error_code error;
-  const uint64_t bytes = std::filesystem::file_size(path, error);
-  if (error) throw Error(ExitCode::BadInput, fmt::format("{}: {}", path, error.message()));
-  if (bytes > kLargestFile)
-    throw Error(ExitCode::BadInput, fmt::format("{}: {} bytes, too large for a network", path, bytes));
-  std::vector<uint8_t> file(bytes);
-  std::ifstream in(path, std::ios::binary);
-  if (!in.read(reinterpret_cast<char*>(file.data()), static_cast<std::streamsize>(bytes)))
-    throw Error(ExitCode::BadInput, path + ": cannot be read: look at its permissions");
-  return parseNetworkFile(file, path);
+  return parseNetworkFile(readWeightsFile(path, kLargestFile), path);
 }
 
 }  // namespace braid

@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "combiners/learned/tza.h"
 
-#include <bit>
-#include <cmath>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 
-#include <half.h>
 #include <fmt/format.h>
 
+#include "combiners/learned/weights_file.h"
 #include "renderer/core/error.h"
 
 namespace braid {
@@ -20,8 +16,6 @@ constexpr uint16_t kMagic = 0x41D7;
 constexpr uint64_t kLargestFile = uint64_t(1) << 28;
 constexpr uint32_t kMostTensors = 4096;
 constexpr uint64_t kLargestSize = 1 << 16;
-
-static_assert(std::endian::native == std::endian::little);
 
 class Parser {
  public:
@@ -92,20 +86,14 @@ void Parser::readValues(Entry& e) const {
   const uint64_t bytes = e.count * (e.type == 'f' ? sizeof(float) : sizeof(uint16_t));
   if (e.begin > file_.size() || bytes > file_.size() - e.begin)
     fail(fmt::format("{}: its {} bytes from byte {} on are not all in the file", e.name, bytes, e.begin));
-  e.tensor.values.resize(e.count);
-  const uint8_t* from = file_.data() + e.begin;
+  const std::span<const uint8_t> from = file_.subspan(e.begin, bytes);
   if (e.type == 'f') {
-    std::memcpy(e.tensor.values.data(), from, bytes);
+    e.tensor.values.resize(e.count);
+    std::memcpy(e.tensor.values.data(), from.data(), bytes);
   } else {
-    for (float& value : e.tensor.values) {
-      Imath::half half;
-      std::memcpy(&half, from, sizeof half);
-      from += sizeof half;
-      value = half;
-    }
+    e.tensor.values = fromHalves(from);
   }
-  for (const float value : e.tensor.values)
-    if (!std::isfinite(value)) fail(fmt::format("{}: a value that is not finite", e.name));
+  if (!areFinite(e.tensor.values)) fail(fmt::format("{}: a value that is not finite", e.name));
 }
 
 WeightTensors Parser::parse() {
@@ -134,17 +122,6 @@ WeightTensors Parser::parse() {
 
 WeightTensors parseTza(std::span<const uint8_t> file, const std::string& path) { return Parser(file, path).parse(); }
 
-WeightTensors readTza(const std::string& path) {
-  std::error_code error;
-  const uint64_t bytes = std::filesystem::file_size(path, error);
-  if (error) throw Error(ExitCode::BadInput, fmt::format("{}: {}", path, error.message()));
-  if (bytes > kLargestFile)
-    throw Error(ExitCode::BadInput, fmt::format("{}: {} bytes, too large for weights of a network", path, bytes));
-  std::vector<uint8_t> file(bytes);
-  std::ifstream in(path, std::ios::binary);
-  if (!in.read(reinterpret_cast<char*>(file.data()), static_cast<std::streamsize>(bytes)))
-    throw Error(ExitCode::BadInput, path + ": cannot be read: look at its permissions");
-  return parseTza(file, path);
-}
+WeightTensors readTza(const std::string& path) { return parseTza(readWeightsFile(path, kLargestFile), path); }
 
 }  // namespace braid

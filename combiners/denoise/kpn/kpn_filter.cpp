@@ -7,6 +7,7 @@
 #include "combiners/pixels/box_mean.h"
 #include "combiners/pixels/window.h"
 #include "renderer/core/parallel.h"
+#include "renderer/core/vec.h"
 #include "renderer/core/vectorised.h"
 
 namespace braid {
@@ -26,14 +27,10 @@ struct Scale {
   Plane<float> brightness, noise;  // the mean luminance of 3x3 pixels and its variance
 };
 
-float luminance(const Rgb<float>& image, size_t i) {
-  return 0.2126f * image[0][i] + 0.7152f * image[1][i] + 0.0722f * image[2][i];
-}
-
 void describe(Scale& s) {
   Plane<float> light(s.image.width(), s.image.height(), kUnfilled);
   parallelChunks(light.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) light[i] = luminance(s.image, i);
+    for (size_t i = begin; i < end; ++i) light[i] = luminance(Spectrum(s.image[0][i], s.image[1][i], s.image[2][i]));
   });
   s.brightness = boxMean<float>(light, 1);
   s.noise = boxMean<float>(s.variance, 1);
@@ -193,8 +190,7 @@ void Join::row(int y, const Rgb<float>& coarse, Rgb<float>& image) const {
       for (size_t c = 0; c < 3; ++c) rgb[c] += w * coarse[c].at(near[j].x, near[j].y);
     }
     for (float& v : rgb) v /= total;
-    const float light = 0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2],
-                difference = scale.brightness[i] - light;
+    const float difference = scale.brightness[i] - luminance(Spectrum(rgb[0], rgb[1], rgb[2]));
     const float z = difference * difference / (scale.noise[i] + kTiny);
     const float excess = std::min(std::max(z - test.tolerance, 0.0f), kMostExcess);
     const float open = exp2NonPositive(std::max(-kLog2E * test.steepness * excess, -100.0f));

@@ -5,14 +5,15 @@
 #include <cmath>
 
 #include "combiners/pixels/box_mean.h"
+#include "combiners/statistics/mean_depth.h"
 #include "renderer/core/parallel.h"
+#include "renderer/core/vec.h"
 
 namespace braid {
 
 namespace {
 
 constexpr float kMinAlbedo = 0.03f;
-constexpr std::array<float, 3> kLuminance = {0.2126f, 0.7152f, 0.0722f};
 // Deviations are relative to the brightness around, which is rarely less.
 constexpr float kDark = 0.01f;
 
@@ -55,46 +56,36 @@ void demodulate(const Rgb<float>& image, const KpnScene& scene, float varianceFa
   const Features* f = scene.features && !scene.features->albedo.mean.empty() ? scene.features : nullptr;
   eachPixel(image.size(), [&](size_t i) {
     const bool surface = f && isSurface(*f, i);
-    float deviation = 0;
+    Spectrum deviation;
     for (size_t c = 0; c < 3; ++c) {
       const float divisor = surface ? std::max(f->albedo.mean[c][i], kMinAlbedo) : 1.0f;
       out.divisor[c][i] = divisor;
       out.irradiance[c][i] = image[c][i] / divisor;
-      deviation += kLuminance[c] * std::sqrt(std::max(scene.variance[c][i], 0.0f)) / divisor;
+      deviation[static_cast<int>(c)] = std::sqrt(std::max(scene.variance[c][i], 0.0f)) / divisor;
       out.input[Radiance + c][i] = compressed(out.irradiance[c][i]);
     }
     // Light is noisy in all channels at once.
-    out.variance[i] = std::min(varianceFactor * deviation * deviation, 1e18f);
+    const float light = luminance(deviation);
+    out.variance[i] = std::min(varianceFactor * light * light, 1e18f);
     out.input[Miss][i] = surface ? 0.0f : 1.0f;
   });
 }
 
 void describeLight(KpnPlanes& out) {
-  Plane<float> luminance(out.width(), out.height(), kUnfilled);
-  eachPixel(luminance.size(), [&](size_t i) {
-    float sum = 0;
-    for (size_t c = 0; c < 3; ++c) sum += kLuminance[c] * std::max(out.irradiance[c][i], 0.0f);
-    luminance[i] = sum;
+  Plane<float> light(out.width(), out.height(), kUnfilled);
+  eachPixel(light.size(), [&](size_t i) {
+    const Rgb<float>& e = out.irradiance;
+    light[i] = luminance(glm::max(Spectrum(e[0][i], e[1][i], e[2][i]), Spectrum(0)));
   });
-  const Plane<float> near = boxMean<float>(luminance, 2), far = boxMean<float>(luminance, 8),
+  const Plane<float> near = boxMean<float>(light, 2), far = boxMean<float>(light, 8),
                      nearVariance = boxMean<float>(out.variance, 2);
-  eachPixel(luminance.size(), [&](size_t i) {
+  eachPixel(light.size(), [&](size_t i) {
     const float level = std::max(near[i], 0.0f) + kDark;
     out.input[Near][i] = compressed(near[i]);
     out.input[Far][i] = compressed(far[i]);
     out.input[Deviation][i] = compressedDeviation(std::sqrt(out.variance[i]) / level);
     out.input[NearDeviation][i] = compressedDeviation(std::sqrt(std::max(nearVariance[i], 0.0f)) / level);
   });
-}
-
-float meanDepth(const Plane<float>& depth) {
-  double sum = 0, count = 0;
-  for (const float d : depth.data)
-    if (std::isfinite(d) && d > 0) {
-      sum += static_cast<double>(d);
-      ++count;
-    }
-  return sum > 0 ? static_cast<float>(sum / count) : 1.0f;
 }
 
 float noiseOf(const Features& f, size_t i) {
@@ -104,7 +95,7 @@ float noiseOf(const Features& f, size_t i) {
 }
 
 void describeFeatures(const Features& f, KpnPlanes& out) {
-  const float depthScale = 1 / meanDepth(f.depth.mean);
+  const float depthScale = inverseMeanDepth(f.depth.mean);
   eachPixel(out.variance.size(), [&](size_t i) {
     for (size_t c = 0; c < 3; ++c) {
       out.input[Albedo + c][i] = std::clamp(orZero(f.albedo.mean[c], i), 0.0f, 1.0f);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "combiners/statistics/mean_depth.h"
 #include "combiners/statistics/variance.h"
 #include "renderer/core/error.h"
 
@@ -47,16 +48,6 @@ void setMissesApart(const float* __restrict depth, int count, float* __restrict 
   for (int x = 0; x < count; ++x) guide[x] += depth[x] == 0 ? kApart : 0.0f;
 }
 
-float inverseMeanDepth(const Features& features) {
-  double sum = 0, count = 0;
-  for (const float d : features.depth.mean.data)
-    if (std::isfinite(d) && d > 0) {
-      sum += static_cast<double>(d);
-      ++count;
-    }
-  return sum > 0 ? static_cast<float>(count / sum) : 0.0f;
-}
-
 }  // namespace
 
 PatchWelchInput patchWelchInput(const Estimate& estimate, const Features* features, bool robustVariance) {
@@ -69,7 +60,7 @@ PatchWelchInput patchWelchInput(const Estimate& estimate, const Features* featur
   }
   input.variance = regularisedVariance(estimate, robustVariance);
   input.passes = passesOf(estimate);
-  if (features) input.depthScale = inverseMeanDepth(*features);
+  if (features) input.depthScale = inverseMeanDepth(features->depth.mean);
   return input;
 }
 
