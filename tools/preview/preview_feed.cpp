@@ -7,6 +7,7 @@
 
 #include "renderer/core/parallel.h"
 #include "renderer/core/stopwatch.h"
+#include "tools/preview/half_size.h"
 
 namespace braid {
 
@@ -63,9 +64,11 @@ void PreviewFeed::showNoisy(const Snapshot& snapshot, double seconds) {
 }
 
 void PreviewFeed::combine(const Snapshot& snapshot, double seconds) {
+  const bool quick = combineBegan_ < 0 && snapshot->width * snapshot->height > kQuickPixels;
   combineBegan_ = seconds;
   combineSamples_ = samplesOf(*snapshot);
-  combineJob_.start([this, snapshot, seconds] {
+  combineJob_.start([this, snapshot, seconds, quick] {
+    if (quick) showQuick(snapshot, seconds);
     const Stopwatch clock;
     const PipelineResult result = runCombining(*snapshot, choice_, choice_.options(&cancel_), helpers_);
     combineTook_ = clock.seconds();
@@ -77,6 +80,16 @@ void PreviewFeed::combine(const Snapshot& snapshot, double seconds) {
       show_(samplesOf(*snapshot), seconds, v);
     });
   });
+}
+
+void PreviewFeed::showQuick(const Snapshot& snapshot, double seconds) {
+  const PipelineResult result = runCombining(halfSize(*snapshot), choice_, choice_.options(&cancel_), helpers_);
+  const PipelineOutput* out = result.find(choice_.methods.back());
+  if (cancel_ || !out || !out->ran()) return;
+  const Rgb<float> image = doubleSize(out->result.image.mean, snapshot->width, snapshot->height);
+  ImageViews views;
+  views.combined = &image;
+  show_(samplesOf(*snapshot), seconds, views);
 }
 
 }  // namespace braid

@@ -22,6 +22,8 @@ class PreviewFeed {
   static constexpr double kInterval = 0.25;       // least seconds between noisy images
   static constexpr double kHeldUpShare = 0.1;     // of the time, for copying estimates
   static constexpr double kCombiningShare = 0.5;  // of the time, for the thread that combines
+  // The first combined image of more pixels is made at half the width and height before.
+  static constexpr int kQuickPixels = 1 << 18;
 
   // Receives images from threads of the feed, with the samples a pixel that they are made from and the seconds of the
   // render by then.
@@ -41,6 +43,7 @@ class PreviewFeed {
   using Snapshot = std::shared_ptr<const Estimates>;
   void showNoisy(const Snapshot& snapshot, double seconds);
   void combine(const Snapshot& snapshot, double seconds);
+  void showQuick(const Snapshot& snapshot, double seconds);
   void collect(BackgroundJob& job);
 
   const CombineChoice choice_;
