@@ -53,6 +53,10 @@ struct Needs {
   // Takes, beyond those `bases`, what there is: the bases or denoisers that a user names, and biased estimates such as
   // photon maps.
   bool anyBases = false;
+  // A denoiser whose image is one of the bases below so many passes of the unbiased estimate, where it can run and the
+  // user names none; empty: there is none.
+  std::string helper;
+  uint64_t helperBelow = 0;
 
   // Of the unbiased estimate.
   uint64_t passes = 2;
@@ -134,7 +138,6 @@ struct MemoryCase {
   int photonMaps = 0;        // of which so many are biased estimates
   bool photonMap = false;    // whether the biased input is one
   bool denoiseHalf = false;  // whether there is MethodInputs::denoiseHalf
-  bool learned = false;      // whether kpn can run, which some methods use by themselves
 };
 
 // Bytes a pixel. The inputs are not counted.

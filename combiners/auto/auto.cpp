@@ -23,7 +23,6 @@
 #include "combiners/pipeline/registry.h"
 #include "combiners/ensemble/scale_weights.h"
 #include "combiners/auto/auto_filters.h"
-#include "combiners/auto/learned_filter.h"
 #include "combiners/auto/refilter.h"
 #include "combiners/shrinkage/shrinkage.h"
 #include "combiners/statistics/local_range_clamp.h"
@@ -38,7 +37,6 @@ const OptionInfo kDebias{"auto-debias", 1, "0: photon maps are not corrected by 
 const OptionInfo kShrink{"auto-shrink", 1, "0: bases only, without James-Stein shrinkage towards them"};
 const OptionInfo kRefilter{"auto-refilter", 1, "0: the combined image is not filtered once more"};
 const OptionInfo kDirectIndirect{"auto-direct-indirect", 1, "0: direct and indirect light are filtered together"};
-const OptionInfo kLearned{"auto-learned", 1, "0: without kpn, which joins the filters below 64 samples"};
 const OptionInfo kFireflies{"auto-remove-fireflies", 1, "0: keep fireflies"};
 
 // What images from filters of direct and indirect light keep of the squared bias that their halves show
@@ -50,6 +48,8 @@ constexpr double kBiasKeptByParts = 0.85;
 // too small wherever no firefly has fallen yet, is no image to be pulled to (combiners/EXPERIMENTS.md, Auto at few
 // samples).
 constexpr uint64_t kPartsPasses = 16, kShrinkPasses = 16;
+// From so many passes on the other filters are as good without a network (combiners/EXPERIMENTS.md, Kernel prediction).
+constexpr uint64_t kLearnedPasses = 256;
 constexpr int kNamedRange = 2;  // radius in pixels of the range that images of other denoisers are kept in
 
 class Auto : public Method {
@@ -62,31 +62,27 @@ class Auto : public Method {
   Needs needs() const override {
     Needs needs;
     needs.anyBases = true;
+    needs.helper = "kpn";
+    needs.helperBelow = kLearnedPasses;
     needs.helpful.features = needs.helpful.featureNoise = true;
     needs.helpful.quarters = needs.helpful.directIndirect = true;
     return needs;
   }
   MethodMemory memory(const MemoryCase& of) const override;
   std::vector<OptionInfo> options() const override {
-    return {kFuse, kDebias, kDirectIndirect, kShrink, kFireflies, kRefilter, kLearned};
+    return {kFuse, kDebias, kDirectIndirect, kShrink, kFireflies, kRefilter};
   }
   MethodResult run(const MethodInputs& in) const override;
 };
 
 MethodMemory Auto::memory(const MemoryCase& of) const {
-  const bool learns = of.learned && learnedFilterRuns(of.passes);
-  const int fused = of.photonMaps > 0 ? 112 : 0, filters = of.bases - of.photonMaps + (learns ? 3 : 2);
+  const int fused = of.photonMaps > 0 ? 112 : 0, filters = of.bases - of.photonMaps + 2;
   const bool shrinks = of.passes == 0 || of.passes >= kShrinkPasses;
   const int candidates = (shrinks ? 2 : 1) * filters, pairs = candidates * (candidates + 1) / 2;
   // 48 of refiltering is a copy without fireflies; the maps of a fused image's errors are gone by then.
   const int combining = 60 + 44 * candidates + 5 * pairs / 4 + fused;
   const int refiltering = 353 + (shrinks ? 16 : 4) * filters + (fused > 0 ? 64 : 0);
-  MethodMemory memory{std::max(combining, refiltering), 44 + 4 * candidates};
-  if (!learns) return memory;
-  const MethodMemory kpn = learnedFilterMemory();
-  memory.peak = std::max(memory.peak, 48 + 36 * (filters - 1) + fused + kpn.peak);
-  memory.eachThread = kpn.eachThread;
-  return memory;
+  return {std::max(combining, refiltering), 44 + 4 * candidates};
 }
 
 // The external base as a filter of x: a denoiser that has seen the unbiased image alone is run again.
@@ -190,10 +186,6 @@ class AutoRun {
   void estimateError();
 
   bool isOn(const OptionInfo& option) const { return in_.options.number(option) != 0; }
-  // Whether the user named the method, so that its image is among the others.
-  bool isNamed(const char* name) const {
-    return std::any_of(others_.begin(), others_.end(), [&](const Estimate* e) { return e->name == name; });
-  }
   bool removesFireflies() const { return isOn(kFireflies); }
   // x, from now on an image that may be changed.
   Estimate& changeableX();
@@ -202,9 +194,9 @@ class AutoRun {
   const Estimate* x_;     // the unbiased image, or the fused one
   Estimate* changeable_;  // the same, or null
   Estimate copy_;         // where it must not be changed
-  bool isFused_ = false, learned_ = false;
+  bool isFused_ = false;
   FusedEstimate fused_;
-  std::vector<const Estimate*> others_;  // images that a user named, and photon maps that are not fused
+  std::vector<const Estimate*> others_;  // images of other denoisers, and photon maps that are not fused
   double biasKept_ = 1;
   std::vector<Estimate> filters_, shrunk_;
   MethodResult result_;
@@ -220,7 +212,7 @@ MethodResult AutoRun::run() {
     result_.image = *x_;
     return std::move(result_);
   }
-  if (in_.firstPass && (learned_ || !others_.empty())) {
+  if (in_.firstPass && !others_.empty()) {
     result_.image = std::move(filters_.front());  // what halves that were made of one image say of others is chance
     return std::move(result_);
   }
@@ -269,7 +261,7 @@ void AutoRun::removeFireflies() {
   replaceVariances(x.variance, fireflies);
 }
 
-// Images that a user named go first: the last filter is the careful one, whose image guides the weights.
+// Images of other denoisers go first: the last filter is the careful one, whose image guides the weights.
 void AutoRun::filter() {
   std::vector<Estimate> own = std::move(filters_);
   filters_.clear();
@@ -277,11 +269,7 @@ void AutoRun::filter() {
     filters_.push_back(consistentHalves(baseOf(*b, *x_, isFused_, in_)));
     if (!in_.firstPass) keepInRange(filters_.back(), *x_);  // what is made of one image shows no range
   }
-  if (std::optional<Estimate> learned = isOn(kLearned) && !isNamed("kpn") ? learnedFilter(*x_, in_) : std::nullopt) {
-    filters_.push_back(std::move(*learned));
-    learned_ = true;
-    result_.remarks.push_back(textAttribute("learned", "kpn"));
-  }
+  if (in_.firstPass && !filters_.empty()) return;  // nothing will judge the others
   if (own.empty()) own = autoFilters(*x_, in_.features, in_.cancel);
   for (Estimate& e : own) filters_.push_back(std::move(e));
 }

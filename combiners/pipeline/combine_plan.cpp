@@ -40,8 +40,11 @@ class CombinePlanner {
   CombinePlanner(const AvailableEstimates& available, const CombinePlanOptions& options)
       : available_(available), options_(options) {}
 
-  // Adds the steps of a method, or reports that the name is an estimate's. Returns why it cannot be an input.
+  // Adds the steps of a method that was named, or reports that the name is an estimate's. Returns why it cannot be an
+  // input.
   std::string add(const std::string& name);
+  // Marks the steps that are there as helpers alone.
+  void markHelpers();
   // Takes out the denoisers of newest images that only stopped methods asked for.
   void dropReplaced(const std::vector<std::string>& wanted);
 
@@ -55,16 +58,23 @@ class CombinePlanner {
   std::string fillBases(Step& step, const std::string& chosen);
   bool readsDirectIndirect(const Step& step) const;
   void fillStop(Step& step);
+  void addHelper(Step& step, const Needs& needs);
+  std::string addStep(const std::string& name);
   std::string defaultBiased(const Step& step, const Needs& needs);
   std::vector<std::string> denoisersInOrder() const;
   std::string lacks(const std::string& estimate, const Needs& needs, bool unbiased) const;
 
   const AvailableEstimates& available_;
   const CombinePlanOptions& options_;
-  std::set<std::string> inProgress_, replaced_;
+  std::set<std::string> inProgress_, replaced_, named_;
 };
 
 std::string CombinePlanner::add(const std::string& name) {
+  named_.insert(name);
+  return addStep(name);
+}
+
+std::string CombinePlanner::addStep(const std::string& name) {
   if (available_.find(name)) return {};
   if (const Step* done = combinePlan.find(name)) return done->skipReason;
   if (!inProgress_.insert(name).second) return fmt::format("{} would be its own input", name);
@@ -211,7 +221,24 @@ std::string CombinePlanner::fillBases(Step& step, const std::string& chosen) {
   if (static_cast<int>(step.bases.size()) < needs.bases)
     return fmt::format("needs {} to choose from, there {}", plural(static_cast<uint64_t>(needs.bases), "base", "bases"),
                        step.bases.size() == 1 ? "is only " + step.bases[0] : fmt::format("are {}", step.bases.size()));
+  if (candidates.empty()) addHelper(step, needs);
   return {};
+}
+
+// Not beside photon maps: the fused image would have to be filtered by it once more. Nor beside another denoiser where
+// there is a single pass, of which only one image is taken.
+void CombinePlanner::addHelper(Step& step, const Needs& needs) {
+  const AvailableEstimate* e = available_.find(step.unbiased);
+  if (!options_.helpers || needs.helper.empty() || !e || e->passes >= needs.helperBelow) return;
+  if (std::count(step.bases.begin(), step.bases.end(), needs.helper)) return;
+  if (e->passes == 1 && !step.bases.empty()) return;
+  for (const std::string& name : step.bases)
+    if (const AvailableEstimate* base = available_.find(name); base && base->bias) return;
+  if (addStep(needs.helper).empty()) step.bases.push_back(needs.helper);
+}
+
+void CombinePlanner::markHelpers() {
+  for (Step& step : combinePlan.steps) step.helper = step.kept == 0 && !named_.count(step.name);
 }
 
 bool CombinePlanner::readsDirectIndirect(const Step& step) const {
@@ -319,6 +346,7 @@ CombinePlan makeCombinePlan(const AvailableEstimates& available, const std::vect
   for (const std::string& name : options.denoisers) maker.add(name);
   for (const std::string& name : wanted) maker.add(name);
   maker.dropReplaced(wanted);
+  maker.markHelpers();
   return std::move(maker.combinePlan);
 }
 

@@ -21,6 +21,7 @@ struct CombinePlanOptions {
   std::string unbiased, correlated, biased;
   std::vector<std::string> bases;
   std::vector<std::string> denoisers;  // asked for, in this order
+  bool helpers = true;                 // whether methods get their helpers (Needs::helper)
   uint64_t stop = 0;                   // passes after which methods that can stop denoising do; 0: never
 };
 
@@ -61,6 +62,7 @@ struct Step {
   uint64_t kept = 0;
   bool directIndirect = false;  // whether the method reads the direct light of the unbiased estimate
   std::string note;             // what a user should know although it runs, in one sentence; mostly empty
+  bool helper = false;          // nobody named it: its image is for the methods that it helps alone
 };
 
 struct CombinePlan {

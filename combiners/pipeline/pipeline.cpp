@@ -232,6 +232,11 @@ double Runner::inputSeconds(const Step& step) const {
 
 void Runner::run(Step step, bool last) {
   PipelineOutput out;
+  // Whoever is helped does without what failed.
+  std::erase_if(step.bases, [&](const std::string& name) {
+    const PipelineOutput* made = result.find(name);
+    return made && made->step.helper && !made->ran();
+  });
   if (step.skipReason.empty()) step.skipReason = missingInput(step, out.failed);
   if (step.skipReason.empty()) {
     MethodInputs in = inputsOf(step);
@@ -291,8 +296,10 @@ PlanesRead planesRead(const CombinePlan& combinePlan) {
   for (const Step& step : combinePlan.steps) {
     if (!step.skipReason.empty()) continue;
     const Needs needs = step.method->needs();
-    // Photon maps, which are bases, are fused with all of the quarters.
-    buffers.quarters |= needs.quarters || (needs.helpful.quarters && !step.bases.empty());
+    // Photon maps, which are bases that no step made, are fused with all of the quarters.
+    const bool given = std::any_of(step.bases.begin(), step.bases.end(),
+                                   [&](const std::string& base) { return !combinePlan.find(base); });
+    buffers.quarters |= needs.quarters || (needs.helpful.quarters && given);
     read.reference |= needs.reference;
   }
   return read;

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "combiners/pipeline/external_method.h"
-#include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/pipeline.h"
 
 namespace braid {
@@ -35,9 +33,6 @@ MemoryCase caseOf(const Step& step, const CombinePlan& combinePlan, const Availa
   for (const std::string& base : step.bases)
     if (const AvailableEstimate* e = available.find(base); e && e->bias) ++c.photonMaps;
   if (const AvailableEstimate* e = available.find(step.biased)) c.photonMap = e->bias;
-  const std::shared_ptr<const Method> kpn = findMethod("kpn");
-  const auto* external = dynamic_cast<const ExternalMethod*>(kpn.get());
-  c.learned = external && external->skipReason().empty();
   const Step* denoiser = combinePlan.find(step.biased);
   const AvailableEstimate* e = available.find(step.unbiased);
   c.denoiseHalf = denoiser && denoiser->method->halvesShareWeights() && denoiser->kept == 0 && e && e->halves &&

@@ -2,16 +2,18 @@
 // The combiner "auto" as a whole: better than its inputs, with an error map that is true.
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 
 #include <doctest/doctest.h>
 
+#include "combiners/denoise/kpn/kpn_network.h"
 #include "combiners/shrinkage/fused_estimate.h"
 #include "combiners/pipeline/external_method.h"
 #include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/pipeline.h"
 #include "tests/combiners/auto_cases.h"
 #include "tests/support/combiner_fixture.h"
-#include "tests/support/without_kpn.h"
+#include "tests/support/running_braid.h"
 
 namespace braid::test_auto {
 
@@ -100,11 +102,13 @@ TEST_CASE("A denoiser whose image is worse than its halves show is not believed"
 }
 
 TEST_CASE("auto measures from two passes on, and makes a picture of one") {
-  const WithoutKpn same;
+  PipelineOptions options;
+  options.roles.helpers = false;
   for (const uint64_t passes : {1, 2, 3}) {
     const Case c = noisyCase(passes);
     const Estimates e = kept(c, {"pt"});
-    const PipelineOutput out = outputOf(e, "auto");
+    const PipelineResult result = runPipeline(e, {"auto"}, options);
+    const PipelineOutput& out = *result.find("auto");
     CAPTURE(passes);
     REQUIRE(out.ran());
     CHECK(out.result.image.passes == passes);
@@ -124,6 +128,49 @@ TEST_CASE("Of one pass auto takes kpn's image where it runs") {
   REQUIRE(both.find("kpn")->ran());
   CHECK(relativeError(both.find("auto")->result.image.mean, c.truth) <
         1.05 * relativeError(both.find("kpn")->result.image.mean, c.truth));
+}
+
+TEST_CASE("kpn helps auto from few samples, and its image is kept only where it is asked for") {
+  if (!dynamic_cast<const ExternalMethod&>(*findMethod("kpn")).skipReason().empty()) return;
+  const auto planOf = [](uint64_t passes, const std::vector<std::string>& wanted, const CombinePlanOptions& options) {
+    AvailableEstimates available;
+    available.features = true;
+    available.estimates = {{"pt", true, Correlation::Independent, passes}};
+    return makeCombinePlan(available, wanted, options);
+  };
+  for (const uint64_t passes : {1, 2, 255}) {
+    const CombinePlan combinePlan = planOf(passes, {"auto"}, {});
+    CAPTURE(passes);
+    REQUIRE(combinePlan.find("kpn"));
+    CHECK(combinePlan.find("kpn")->helper);
+    CHECK(combinePlan.find("auto")->bases == std::vector<std::string>{"kpn"});
+  }
+  CHECK_FALSE(planOf(256, {"auto"}, {}).find("kpn"));
+  CHECK_FALSE(planOf(4, {"auto", "kpn"}, {}).find("kpn")->helper);
+  CHECK_FALSE(planOf(4, {"auto", "js@kpn"}, {}).find("kpn")->helper);
+  CombinePlanOptions options;
+  options.helpers = false;
+  CHECK_FALSE(planOf(4, {"auto"}, options).find("kpn"));
+  options = {};
+  options.bases = {"nlm"};
+  CHECK_FALSE(planOf(4, {"auto"}, options).find("kpn"));
+  options = {};
+  options.denoisers = {"nlm"};
+  CHECK(planOf(4, {"auto"}, options).find("kpn"));
+  CHECK_FALSE(planOf(1, {"auto"}, options).find("kpn"));  // one image is taken, the named one
+}
+
+TEST_CASE("auto does without a helper that fails") {
+  const Folder folder;
+  const std::string broken = (folder.path / "broken.network").string();
+  std::ofstream(broken) << "no network";
+  nameKpnNetwork(broken);
+  const Estimates e = kept(noisyCase(4), {"pt"});
+  const PipelineResult result = runPipeline(e, {"auto"}, {});
+  nameKpnNetwork("");
+  REQUIRE(result.find("auto")->ran());
+  CHECK(result.find("auto")->step.bases.empty());
+  if (const PipelineOutput* kpn = result.find("kpn")) CHECK_FALSE(kpn->ran());
 }
 
 TEST_CASE("Of one pass auto takes the named denoiser's image, for nothing can judge it") {
@@ -155,7 +202,8 @@ TEST_CASE("auto takes a consistent estimate in the place of an unbiased one, as 
   consistent.estimates[0].unbiased = false;
   const PipelineOutput one = outputOf(unbiased, "auto"), other = outputOf(consistent, "auto");
   CHECK(other.step.unbiased == "pt");
-  CHECK(other.step.bases.empty());
+  CHECK(std::count(other.step.bases.begin(), other.step.bases.end(), "pt") == 0);
+  CHECK(other.step.bases == one.step.bases);
   bool same = true;
   for (size_t i = 0; i < one.result.error.size(); ++i)
     same &= one.result.image.mean.pixel(i) == other.result.image.mean.pixel(i) &&

@@ -7,7 +7,6 @@
 #include "combiners/pipeline/pipeline.h"
 #include "combiners/pipeline/pipeline_memory.h"
 #include "combiners/pipeline/registry.h"
-#include "tests/support/without_kpn.h"
 #include "tests/support/combiner_fixture.h"
 #include "tests/support/counted_memory.h"
 
@@ -87,7 +86,6 @@ void checkMemory(const Method& method, const Case& c, const std::vector<const ch
 }  // namespace
 
 TEST_CASE("every method states its memory to 10 %") {
-  const WithoutKpn same;
   const std::vector<std::vector<const char*>> baseSets{
       {}, {"narrow"}, {"narrow", "wide"}, {"sppm"}, {"sppm", "narrow"}, {"sppm", "narrow", "wide", "narrow"}};
   for (const uint64_t samples : {2u, 16u, 64u}) {
@@ -109,7 +107,6 @@ TEST_CASE("every method states its memory to 10 %") {
 }
 
 TEST_CASE("auto states its memory where it filters direct and indirect light apart") {
-  const WithoutKpn same;
   const std::shared_ptr<const Method> method = findMethod("auto");
   for (const uint64_t samples : {2u, 16u, 64u}) {
     const Case c = withDirectIndirect(caseOf(samples));
@@ -122,17 +119,18 @@ TEST_CASE("auto states its memory where it filters direct and indirect light apa
 }
 
 TEST_CASE("the pipeline takes the memory that follows from a combine plan") {
-  const WithoutKpn same;
   Case c = withDirectIndirect(caseOf(16));
   c.estimates.reference = c.truth;
   const AvailableEstimates available = availableIn(c.estimates);
+  PipelineOptions options;
+  options.roles.helpers = false;  // networks state the most that they can take
   for (const std::vector<std::string>& wanted : std::vector<std::vector<std::string>>{
            {"auto"}, {"js@nfor"}, {"js@rdfc"}, {"ensemble@pw+nlm+rdfc"}, {"curves@nlm"}, {"ideal@pw"}}) {
     const uint64_t stated =
-        pipelineMemory(makeCombinePlan(available, wanted, {}), available, kWidth * kHeight, kThreads);
+        pipelineMemory(makeCombinePlan(available, wanted, options.roles), available, kWidth * kHeight, kThreads);
     const int64_t before = heapBytes();
     resetHeapPeak();
-    withThreads(kThreads, [&] { runPipeline(c.estimates, wanted, {}); });
+    withThreads(kThreads, [&] { runPipeline(c.estimates, wanted, options); });
     INFO(wanted[0]);
     CHECK(static_cast<double>(heapPeak() - before) == doctest::Approx(static_cast<double>(stated)).epsilon(0.1));
   }

@@ -13,7 +13,6 @@
 #include <fmt/format.h>
 
 #include "renderer/session/rendering_revision.h"
-#include "tests/support/without_kpn.h"
 #include "tests/support/render_fixture.h"
 #include "tools/images/exr_metadata.h"
 #include "tools/prepare/prepared_render.h"
@@ -56,6 +55,7 @@ Pixels rendered(const std::string& scene, const std::string& integrator, const s
   samples.integrators = {integrator};
   samples.spp = 4;
   CombineChoice combine;
+  combine.helpers = false;  // what a network makes depends on the machine
   combine.methods = parseMethods(method);
   const PreparedRender render = prepareRender(choice, makeSettings(choice, samples), combine, {samples.spp});
   const std::unique_ptr<Session> session = beginSession(render, choice);
@@ -68,7 +68,6 @@ Pixels rendered(const std::string& scene, const std::string& integrator, const s
 }
 
 Renders renders() {
-  const test::WithoutKpn same;
   Renders all;
   for (const Integrator* i : test::integrators())
     all[fmt::format("cornell {}", i->name())] = rendered("cornell", i->name());

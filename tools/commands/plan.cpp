@@ -116,15 +116,16 @@ void checkJobOptions(const PlanOptions& o) {
 }
 
 void printRecord(const PreparedRender& render, const std::string& file) {
-  const auto& [plan, combinePlan, memory, note] = render.planned;
+  const PlannedRender& planned = render.planned;
+  const Plan& plan = planned.plan;
   nlohmann::json lines = nlohmann::json::array();
   for (const PlanLine& line : plan.lines)
     lines.push_back({{"kept", line.kept}, {"subject", line.subject}, {"reason", line.reason}});
   nlohmann::json combiners = nlohmann::json::array();
-  for (const Step& step : combinePlan.steps)
+  for (const Step& step : planned.combinePlan.steps)
     combiners.push_back({{"kept", step.skipReason.empty()}, {"subject", step.name}, {"reason", step.skipReason}});
-  nlohmann::json bytes = {{"filmPerPixel", plan.filmBytesPerPixel}, {"total", memory.total()}};
-  for (const MemoryItem& item : memory.items) bytes[item.use] = item.bytes;
+  nlohmann::json bytes = {{"filmPerPixel", plan.filmBytesPerPixel}, {"total", planned.memory.total()}};
+  for (const MemoryItem& item : planned.memory.items) bytes[item.use] = item.bytes;
   const nlohmann::json record = {
       {"schema", 1},         {"scene", file},          {"traits", render.scene().traits().names()},
       {"plan", lines},       {"combiners", combiners}, {"hash", hexString(plan.hash())},

@@ -53,6 +53,7 @@ PipelineOptions CombineChoice::options(const std::atomic<bool>* cancel) const {
   o.roles.biased = biased;
   o.roles.bases = bases;
   o.roles.denoisers = denoisers;
+  o.roles.helpers = helpers;
   o.cancel = cancel;
   const std::vector<OptionInfo> infos = allMethodOptions();
   for (size_t i = 0; i < numbers.size() && i < infos.size(); ++i)
@@ -69,6 +70,8 @@ void addCombineOptions(CLI::App& command, CombineChoice& c) {
                   "Biased input of combiners: an estimate, a denoiser or another combiner (--list)")
       ->type_name("NAME");
   addList(command, "--bases", c.bases, "Images that ensembles choose from, by name, separated by commas");
+  command.add_flag("--no-helpers{false}", c.helpers,
+                   "Combine without denoisers that were not named: auto takes kpn below 256 samples");
   command.add_flag("--weights", c.weights, "Also write the maps of weights that combiners worked out");
   const std::vector<OptionInfo> infos = allMethodOptions();
   c.numbers.assign(infos.size(), std::numeric_limits<double>::quiet_NaN());
@@ -143,8 +146,8 @@ CombinedLayers::CombinedLayers(const PipelineResult& result, const std::vector<s
     if (!out.ran()) continue;
     const std::vector<Attribute> remarks = remarksOf(out, timing);
     estimates.attributes.insert(estimates.attributes.end(), remarks.begin(), remarks.end());
-    // An image of fewer passes would be taken for that of all in the file.
-    if (out.step.method->kind() == MethodKind::Denoiser && out.step.kept == 0) {
+    // An image of fewer passes would be taken for that of all in the file, and nobody asked for a helper's.
+    if (out.step.method->kind() == MethodKind::Denoiser && out.step.kept == 0 && !out.step.helper) {
       Estimate e = out.result.image;
       e.name = layerName(out.step.name);
       std::erase_if(estimates.estimates, [&](const Estimate& old) { return old.name == e.name; });
@@ -195,7 +198,8 @@ std::vector<std::string> combineWarnings(const PipelineResult& result, bool aske
     lines.push_back(fmt::format("inputs of combiners: {} negative variances count as 0, {} values were limited",
                                 s.negativeVariance, s.outOfRange));
   for (const PipelineOutput& out : result.outputs) {
-    if (!out.ran() && asked) lines.push_back(fmt::format("{} did not run: {}", out.step.name, out.step.skipReason));
+    if (!out.ran() && (out.step.helper ? out.failed : asked))
+      lines.push_back(fmt::format("{} did not run: {}", out.step.name, out.step.skipReason));
     if (!out.step.note.empty()) lines.push_back(fmt::format("{} {}", out.step.name, out.step.note));
   }
   return lines;

@@ -27,6 +27,7 @@ struct CombineChoice {
   std::vector<std::string> denoisers, bases;
   std::string biased;
   bool weights = false;  // also write the maps of weights
+  bool helpers = true;   // whether methods get the denoisers that help them
   // Values of method options, in the order of allMethodOptions(); not a number: the default.
   std::vector<double> numbers;
 

@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include "braid/plan_combining.h"
-#include "combiners/denoise/kpn/kpn_network.h"
 #include "combiners/pipeline/pipeline_memory.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
@@ -60,9 +59,8 @@ std::string MemoryPlan::text() const {
   return text + '\n';
 }
 
-namespace {
-
-MemoryPlan memoryOf(const Scene& scene, const Plan& plan, const CombinePlan& combinePlan, uint64_t samples) {
+MemoryPlan planMemory(const Scene& scene, const Plan& plan, const std::vector<CombinePlan>& combinePlans,
+                      uint64_t samples) {
   const auto pixels = static_cast<uint64_t>(plan.window.width()) * static_cast<uint64_t>(plan.window.height());
   const AvailableEstimates available = plannedEstimates(plan, samples);
   const MemoryItem film{"film", pixels * (plan.filmBytesPerPixel + historyBytes(available))};
@@ -71,7 +69,9 @@ MemoryPlan memoryOf(const Scene& scene, const Plan& plan, const CombinePlan& com
   const MemoryItem copy{"the copy that is published",
                         pixels * (static_cast<uint64_t>(estimatesMemory(available)) + rest)};
   const int threads = plan.settings.threads > 0 ? plan.settings.threads : machineThreads();
-  const MemoryItem combining{"combining", pipelineMemory(combinePlan, available, pixels, threads)};
+  MemoryItem combining{"combining"};
+  for (const CombinePlan& combinePlan : combinePlans)
+    combining.bytes = std::max(combining.bytes, pipelineMemory(combinePlan, available, pixels, threads));
   const MemoryItem writing{"writing", writingBytes(plan, available)};
   MemoryPlan memory;
   memory.items = {{"program", kProgram},
@@ -89,16 +89,6 @@ MemoryPlan memoryOf(const Scene& scene, const Plan& plan, const CombinePlan& com
   memory.items.push_back(copy);
   memory.items.push_back(combining.bytes > writing.bytes ? combining : writing);
   return memory;
-}
-
-}  // namespace
-
-// Networks take a hundred megabytes a thread: where they do not fit, auto does without kpn.
-MemoryPlan planMemory(const Scene& scene, const Plan& plan, const CombinePlan& combinePlan, uint64_t samples) {
-  MemoryPlan memory = memoryOf(scene, plan, combinePlan, samples);
-  if (memory.total() <= memoryLimit()) return memory;
-  nameKpnNetwork("left out within --memory-limit");
-  return memoryOf(scene, plan, combinePlan, samples);
 }
 
 void requireWithinLimit(const MemoryPlan& plan) {

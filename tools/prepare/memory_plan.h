@@ -29,8 +29,10 @@ struct MemoryPlan {
 };
 
 // The peak of a render of so many samples (0: not known) whose results are published: the scene, the film, what
-// integrators need besides, the copy of the estimates that is published, and combining or writing it.
-MemoryPlan planMemory(const Scene& scene, const Plan& plan, const CombinePlan& combinePlan, uint64_t samples);
+// integrators need besides, the copy of the estimates that is published, and combining, by any of the combine plans, or
+// writing it.
+MemoryPlan planMemory(const Scene& scene, const Plan& plan, const std::vector<CombinePlan>& combinePlans,
+                      uint64_t samples);
 
 // Throws Error(OutOfMemory), naming what takes most, when the plan exceeds memoryLimit().
 void requireWithinLimit(const MemoryPlan& plan);

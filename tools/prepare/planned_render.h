@@ -15,7 +15,8 @@ struct PlannedRender {
   Plan plan;
   CombinePlan combinePlan;  // what is kept for combiners, and their skipReasons
   MemoryPlan memory;
-  std::string note;  // why the default is not combined; empty: it is, or nobody asked
+  std::string note;     // why the default is not combined; empty: it is, or nobody asked
+  std::string without;  // helpers that the limit of memory leaves out, by name; empty: none
 
   std::string text() const;
 };
@@ -26,7 +27,7 @@ struct RenderExtent {
   bool resumed = false;  // a state is there already, and holds what it holds
 };
 
-// Where the default is left out, `choice` becomes "none".
+// Where the default is left out, `choice` becomes "none"; where helpers do not fit, it becomes one without them.
 PlannedRender planRender(const Scene& scene, const CameraData& camera, const Settings& settings,
                          const std::vector<const Integrator*>& integrators, CombineChoice& choice, RenderExtent extent);
 

@@ -124,7 +124,8 @@ TEST_CASE("Where the default cannot combine, the image stays as it is, without a
   const auto total = [&](const std::string& combine) {
     return Json::parse(must(folder, "plan --json " + view + combine).out)["memoryBytes"]["total"].get<uint64_t>() >> 20;
   };
-  const std::string limit = " --memory-limit " + std::to_string((total("") + total("--combine none")) / 2) + "M";
+  const std::string limit =
+      " --memory-limit " + std::to_string((total("--no-helpers") + total("--combine none")) / 2) + "M";
   CHECK(contains(must(folder, "render " + view + "-o out.exr" + limit).err,
                  "nothing is combined: auto: takes more memory"));
   CHECK(braidRun(folder, "render " + view + "-o out.exr --combine auto" + limit).code == 5);
@@ -156,9 +157,10 @@ TEST_CASE("Shares and checkpoints keep what combining their sum will take") {
 TEST_CASE("plan and preview have the defaults of render") {
   const Folder folder;
   const Run plan = must(folder, "plan " + kScene);
-  CHECK(contains(plan.out, "+ auto: of pt\n"));
+  CHECK(contains(plan.out, "+ auto: of pt"));
+  CHECK(contains(must(folder, "plan --no-helpers " + kScene).out, "+ auto: of pt\n"));
   CHECK(contains(plan.out, "- sppm: "));
-  CHECK(contains(must(folder, "plan " + kScene + "--spp 1").out, "+ auto: of pt\n"));
+  CHECK(contains(must(folder, "plan " + kScene + "--spp 1").out, "+ auto: of pt"));
   CHECK(contains(must(folder, "plan " + kScene + "--integrator crn").out, "- auto: needs "));
   CHECK_FALSE(contains(must(folder, "plan " + kScene + "--combine none").out, "auto"));
   must(folder, "preview " + kScene + "--http 0 --size 32x24 --spp 8 -o out.exr");

@@ -4,6 +4,7 @@
 
 #include "renderer/film/files/exr.h"
 #include "tests/support/command_line.h"
+#include "tests/support/contains.h"
 #include "tools/options/memory_limit.h"
 
 namespace braid::test_memory_limit {
@@ -56,6 +57,17 @@ TEST_CASE("memory limits: at any limit a run ends well or with exit code 5 and o
   }
   CHECK(refused > 0);
   CHECK(done > 0);
+}
+
+TEST_CASE("memory limits: helpers that do not fit are left out, which the plan says") {
+  const Folder folder;
+  const std::string view = kScene + "--size 64x48 --spp 4";
+  const std::string plan = braidRun(folder, "plan " + view).out;
+  if (!contains(plan, "+ kpn: ")) return;  // a machine without networks
+  const std::string limited = braidRun(folder, "plan " + view + " --threads 8 --memory-limit 300M").out;
+  CHECK(contains(limited, "- kpn: takes more memory than the limit allows\n"));
+  CHECK(contains(limited, "+ auto: of pt\n"));
+  CHECK(braidRun(folder, "render " + view + " -o out.exr --memory-limit 300M --threads 8").code == 0);
 }
 
 TEST_CASE("memory limits: what does not fit is refused while it is read") {
