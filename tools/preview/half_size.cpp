@@ -87,7 +87,9 @@ Rgb<float> doubleSize(const Rgb<float>& image, int width, int height) {
       const Between column(x, image.width());
       for (size_t c = 0; c < 3; ++c) {
         const Plane<float>& p = image[c];
-        const auto along = [&](int v) { return std::lerp(p.at(column.first, v), p.at(column.second, v), column.share); };
+        const auto along = [&](int v) {
+          return std::lerp(p.at(column.first, v), p.at(column.second, v), column.share);
+        };
         out[c].at(x, y) = std::lerp(along(row.first), along(row.second), row.share);
       }
     }

@@ -43,10 +43,10 @@ TEST_CASE("half size: means of the pixels that there are, and their variances") 
   const Estimate& pt = half.estimates.front();
   CHECK(pt.name == "pt");
   CHECK(pt.passes == 1);
-  CHECK(pt.mean[0].at(0, 0) == 5.5f);    // of 0, 1, 10, 11
-  CHECK(pt.mean[1].at(1, 0) == 8.5f);    // of 2, 3, 12, 13, and 1
-  CHECK(pt.mean[0].at(2, 0) == 9);       // of 4 and 14
-  CHECK(pt.mean[0].at(0, 1) == 20.5f);   // of 20 and 21
+  CHECK(pt.mean[0].at(0, 0) == 5.5f);   // of 0, 1, 10, 11
+  CHECK(pt.mean[1].at(1, 0) == 8.5f);   // of 2, 3, 12, 13, and 1
+  CHECK(pt.mean[0].at(2, 0) == 9);      // of 4 and 14
+  CHECK(pt.mean[0].at(0, 1) == 20.5f);  // of 20 and 21
   CHECK(pt.mean[0].at(2, 1) == 24);
   CHECK(pt.half[0][2].at(0, 0) == 7.5f);
   CHECK(pt.half[1].empty());
