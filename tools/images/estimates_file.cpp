@@ -34,27 +34,6 @@ void varianceFromHalves(Estimate& e, const std::string& file, std::vector<std::s
 // Whether a file holds estimates of braid, with their statistics.
 bool isBraids(const ImageFile& file) { return !estimateNames(file).empty(); }
 
-// What a renderer left out.
-void deriveStatistics(Estimates& all, const std::string& file, std::vector<std::string>* notes) {
-  Estimate& e = all.estimates.front();
-  const bool noVariance = e.variance.empty(), noHalves = !complete(e.half);
-  const auto tell = [&](const char* attribute, const char* text) {
-    all.attributes.push_back(textAttribute(fmt::format("braid/{}/{}", e.name, attribute), text));
-    if (notes) notes->push_back(fmt::format("{}: {} of {}: {}", file, attribute, e.name, text));
-  };
-  if (noVariance) {
-    e.variance = spatialVariance(e.mean, all.features ? &*all.features : nullptr);
-    tell("variance", "estimated from the differences of neighbouring pixels, as the file holds none");
-  }
-  if (noHalves) {
-    makeHalves(e);
-    tell("halves",
-         "the image plus and minus noise of its variance, as there is only one: two renders with different "
-         "seeds, A.exr,B.exr, are better");
-  }
-  if ((noVariance || noHalves) && e.passes < 4) e.passes = 0;  // neither is what so few samples would tell
-}
-
 std::vector<std::string> splitFiles(const std::string& text) {
   std::vector<std::string> files(1);
   for (const char c : text)
@@ -179,6 +158,27 @@ void completeEstimates(Estimates& all, const std::string& path, bool braids, con
 }
 
 }  // namespace
+
+void deriveStatistics(Estimates& all, const std::string& file, std::vector<std::string>* notes) {
+  Estimate& e = all.estimates.front();
+  varianceFromHalves(e, file, notes);
+  const bool noVariance = e.variance.empty(), noHalves = !complete(e.half);
+  const auto tell = [&](const char* attribute, const char* text) {
+    all.attributes.push_back(textAttribute(fmt::format("braid/{}/{}", e.name, attribute), text));
+    if (notes) notes->push_back(fmt::format("{}: {} of {}: {}", file, attribute, e.name, text));
+  };
+  if (noVariance) {
+    e.variance = spatialVariance(e.mean, all.features ? &*all.features : nullptr);
+    tell("variance", "estimated from the differences of neighbouring pixels, as the file holds none");
+  }
+  if (noHalves) {
+    makeHalves(e);
+    tell("halves",
+         "the image plus and minus noise of its variance, as there is only one: two renders with different "
+         "seeds, A.exr,B.exr, are better");
+  }
+  if ((noVariance || noHalves) && e.passes < 4) e.passes = 0;  // neither is what so few samples would tell
+}
 
 // A file of braid without estimates is what renders write unless they are told otherwise.
 void noteMissingEstimates(const ImageFile& file, const ReadOptions& options) {

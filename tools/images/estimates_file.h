@@ -46,6 +46,10 @@ struct ReadOptions {
 // for those whose pixels are copies of each other.
 Estimates readEstimates(const ImageFile& file, const ReadOptions& options = {});
 
+// Completes the first estimate: its variance from its halves, else from the differences of neighbouring pixels; halves
+// from the image and its variance. The attributes say so, and `notes` gets a line that begins with `file` for each.
+void deriveStatistics(Estimates& all, const std::string& file, std::vector<std::string>* notes);
+
 // Estimates by an option such as --unbiased: FILE; or HALFA,HALFB, whose mean is the image; or IMAGE,HALFA,HALFB. FILE
 // may be FILE:NAME for one of the estimates in a file of braid, which then is the first, or for a layer of another
 // renderer's. Variances that are missing are taken from the halves, (A - B)²/4. Invalid pixels of other renderers are

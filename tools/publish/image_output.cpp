@@ -40,20 +40,6 @@ std::string lightOutOfReach(const Estimates& estimates) {
   return "";
 }
 
-// The error of the last wanted method that ran, or of the first integrator; none where light is missing, which leaves
-// no trace in the samples.
-std::optional<double> headlineError(const PipelineResult& combined, const std::vector<std::string>& wanted,
-                                    const Estimates& estimates) {
-  if (!lightOutOfReach(estimates).empty()) return std::nullopt;
-  if (const MethodResult* result = headlineOf(combined, wanted)) {
-    if (result->error.empty()) return std::nullopt;
-    return relativeError(result->error, squaredLevels(result->image.mean));
-  }
-  const Estimate& first = estimates.estimates.front();
-  if (!knowsError(first)) return std::nullopt;
-  return relativeError(errorMap(first), squaredLevels(first));
-}
-
 // Both tasks run, beside each other; then throws what the first of them threw.
 void bothWhateverFails(const std::function<void()>& one, const std::function<void()>& other) {
   std::exception_ptr failures[2];
@@ -70,6 +56,18 @@ void bothWhateverFails(const std::function<void()>& one, const std::function<voi
 }
 
 }  // namespace
+
+std::optional<double> headlineError(const PipelineResult& combined, const std::vector<std::string>& wanted,
+                                    const Estimates& estimates) {
+  if (!lightOutOfReach(estimates).empty()) return std::nullopt;
+  if (const MethodResult* result = headlineOf(combined, wanted)) {
+    if (result->error.empty()) return std::nullopt;
+    return relativeError(result->error, squaredLevels(result->image.mean));
+  }
+  const Estimate& first = estimates.estimates.front();
+  if (!knowsError(first)) return std::nullopt;
+  return relativeError(errorMap(first), squaredLevels(first));
+}
 
 std::vector<std::string> ImageOutput::files() const {
   std::vector<std::string> list;

@@ -86,6 +86,11 @@ struct WrittenImage {
 WrittenImage writeImage(const ImageOutput& output, Estimates& estimates, const Plane<float>* alpha, int threads,
                         const std::atomic<bool>* cancel = nullptr);
 
+// The error of the last wanted method that ran, or of the first integrator; none where light is missing, which leaves
+// no trace in the samples.
+std::optional<double> headlineError(const PipelineResult& combined, const std::vector<std::string>& wanted,
+                                    const Estimates& estimates);
+
 // Calls `show` with what the estimates and the methods that ran on them hold.
 void showImages(const Estimates& estimates, const PipelineResult& combined, const std::vector<std::string>& wanted,
                 const ShowImages& show);
