@@ -12,6 +12,7 @@
 
 #include "renderer/core/error.h"
 #include "tools/commands/lists.h"
+#include "tools/manual/documents.h"
 #include "tools/options/cli.h"
 #include "tools/options/syntax/help.h"
 #include "tools/options/memory_limit.h"
@@ -40,6 +41,10 @@ int run(int argc, char** argv) {
     std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
     app.parse(std::move(arguments));
     if (options.list) return printLists();
+    if (!options.documents.empty()) {
+      writeDocuments(app, options.documents);
+      return 0;
+    }
     if (!action) {
       fmt::print("{}", app.help());
       return static_cast<int>(ExitCode::Usage);

@@ -12,6 +12,9 @@ namespace braid {
 void addCommands(CLI::App& app, MainOptions& o, Action& action) {
   app.require_subcommand(0, 1);
   app.add_flag("--list", o.list, "Print every registered integrator, denoiser, combiner and metric");
+  app.add_option("--documents", o.documents, "Write man pages and completions of shells to a folder")
+      ->type_name("FOLDER")
+      ->group("");
   addParsed(app, "--memory-limit", o.memoryLimit, parseBytes,
             "Memory that may be taken, such as 4G; beyond it: exit code 5")
       ->type_name("SIZE");

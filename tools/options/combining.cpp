@@ -70,8 +70,9 @@ void addCombineOptions(CLI::App& command, CombineChoice& c) {
                   "Biased input of combiners: an estimate, a denoiser or another combiner (--list)")
       ->type_name("NAME");
   addList(command, "--bases", c.bases, "Images that ensembles choose from, by name, separated by commas");
-  command.add_flag("--no-helpers{false}", c.helpers,
-                   "Combine without denoisers that were not named: auto takes kpn below 256 samples");
+  command.add_flag_callback(
+      "--no-helpers", [&c] { c.helpers = false; },
+      "Combine without denoisers that were not named: auto takes kpn below 256 samples");
   command.add_flag("--weights", c.weights, "Also write the maps of weights that combiners worked out");
   const std::vector<OptionInfo> infos = allMethodOptions();
   c.numbers.assign(infos.size(), std::numeric_limits<double>::quiet_NaN());
