@@ -16,7 +16,11 @@ fail() { echo "FAILED: $*"; exit 1; }
 [[ -x $braid ]] || fail "no braid at $braid: build it, or name one"
 
 # --- Slurm -----------------------------------------------------------------------------------------------------------
-if ! command -v slurmctld slurmd munged sbatch >/dev/null; then
+missing() {
+  for program in slurmctld slurmd munged sbatch; do command -v $program >/dev/null || return 0; done
+  return 1
+}
+if missing; then
   [[ $(id -u) == 0 ]] || skip "slurmctld, slurmd or munged is not installed, and only root can install them"
   { apt-get update -q && DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends \
     slurmctld slurmd slurm-client munge; } >/dev/null 2>&1 || skip "apt-get cannot install slurmctld, slurmd and munge"
@@ -180,7 +184,7 @@ chmod +x flaky
 frames=(--frames 0:24 --fps 24)
 "$braid" plan moving.glb -q "${options[@]}" "${frames[@]}" --spp 8 --threads 1 --tasks 2 --format slurm \
   --program "$work/job/flaky" -o "f_##.exr" >frames.sh
-merges() { bash frames.sh | tee /dev/stderr | sed -E 's/.* ([0-9]+) *$/\1/'; }
+merges() { bash frames.sh | tee -a /dev/stderr | sed -E 's/.* ([0-9]+) *$/\1/'; }
 ended() { ! squeue -h -j "$1" 2>/dev/null | grep -q .; }
 merge=$(merges)
 for ((i = 0; i < 600; ++i)); do ended "$merge" && break; sleep 0.2; done

@@ -1,12 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the accumulators hold: their sums by name, and their counts.
+// What the accumulators hold: their sums by name, added up by their lists, and their counts.
 #include <utility>
 
 #include "renderer/core/error.h"
+#include "renderer/core/parallel.h"
 #include "renderer/film/direct_light.h"
 #include "renderer/film/film.h"
 
 namespace braid {
+
+void addSums(const RawSums& to, const RawSums& from) {
+  BRAID_ASSERT(to.size() == from.size());
+  for (size_t p = 0; p < to.size(); ++p) {
+    Plane<double>& sum = *to[p].plane;
+    const Plane<double>& more = *from[p].plane;
+    BRAID_ASSERT(to[p].name == from[p].name && sum.width == more.width && sum.height == more.height);
+    parallelChunks(sum.size(), kPixelChunk, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) sum[i] += more[i];
+    });
+  }
+}
 
 void Accumulator::listSums(const std::string& sum, const std::string& squares, RawSums& list) {
   for (size_t k = 0; k < sum_.size(); ++k) listColour(sum + std::to_string(k), sum_[k], list);

@@ -66,6 +66,7 @@ std::string valueOf(const std::vector<StateOption>& options, const std::string& 
 }
 
 constexpr char kStops[] = "the stop of denoising";
+constexpr char kRevision[] = "the rendering revision";
 
 // Sorts, and joins intervals that touch.
 void normalise(std::vector<PassInterval>& list) {
@@ -176,6 +177,8 @@ Estimates estimatesOf(const FilmState& state, bool quarters) {
 std::string difference(const StateIdentity& there, const StateIdentity& here, bool sameBits) {
   std::string text;
   sayDifference(text, "the version of braid", there.version, here.version);
+  sayDifference(text, kRevision, valueOf(there.options, kRevision), valueOf(here.options, kRevision));
+  if (!text.empty()) return text;  // another braid has other options
   if (sameBits) {
     sayDifference(text, "the build", there.build, here.build);
     sayDifference(text, "--isa", there.isa, here.isa);

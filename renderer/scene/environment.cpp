@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "renderer/core/parallel.h"
+#include "renderer/core/plane.h"
 
 namespace braid {
 
@@ -19,6 +20,26 @@ size_t findInterval(const float* cdf, size_t count, float u, float& fraction) {
   const float width = cdf[i + 1] - cdf[i];
   fraction = width > 0 ? std::clamp((u - cdf[i]) / width, 0.0f, kOneMinusEpsilon) : 0.5f;
   return i;
+}
+
+// The cumulative table of row y, width + 1 values from 0 to 1, and the mean density of its texels. That of a texel is
+// the mean of the bilinear interpolant over it (weights 1/8, 3/4, 1/8 on each axis), so that it is positive wherever
+// the interpolated radiance is.
+double accumulateRow(const Plane<float>& radiance, int y, float* cdf) {
+  const int width = radiance.width, height = radiance.height;
+  const size_t w = static_cast<size_t>(width);
+  std::vector<double> sum(w + 1, 0.0);
+  for (int x = 0; x < width; ++x) {
+    double v = 0;
+    for (int dy = -1; dy <= 1; ++dy)
+      for (int dx = -1; dx <= 1; ++dx)
+        v += (dx ? 0.125 : 0.75) * (dy ? 0.125 : 0.75) *
+             static_cast<double>(radiance.at((x + dx + width) % width, std::clamp(y + dy, 0, height - 1)));
+    sum[static_cast<size_t>(x) + 1] = sum[static_cast<size_t>(x)] + v;
+  }
+  for (size_t x = 0; x <= w; ++x)
+    cdf[x] = static_cast<float>(sum[w] > 0 ? sum[x] / sum[w] : static_cast<double>(x) / static_cast<double>(w));
+  return sum[w] / static_cast<double>(w);
 }
 
 }  // namespace
@@ -60,12 +81,9 @@ Spectrum Environment::texel(int x, int y) const {
 
 // Even light is found best by the surface that it falls on, bright spots by light sampling: without the even part of
 // the image (MIS compensation, Karlík et al. 2019) less light samples are spent on it.
-//
-// The density of a texel is the mean of the bilinear interpolant over it (weights 1/8, 3/4, 1/8 on each axis), so that
-// it is positive wherever the interpolated radiance is.
 void Environment::buildDistribution() {
   const size_t w = static_cast<size_t>(width_), h = static_cast<size_t>(height_);
-  std::vector<float> luminances(w * h);
+  Plane<float> luminances(width_, height_);
   std::vector<glm::dvec3> rowSum(h);
   parallelRows(height_, [&](int y) {
     glm::dvec3 sum(0);
@@ -73,32 +91,17 @@ void Environment::buildDistribution() {
       const Spectrum s = texel(x, y);
       sum += glm::dvec3(s);
       const float radiance = braid::average(s);
-      luminances[static_cast<size_t>(y) * w + static_cast<size_t>(x)] =
-          base_ > 0 ? std::max(radiance - base_, 0.0f) + kRest * radiance : radiance;
+      luminances.at(x, y) = base_ > 0 ? std::max(radiance - base_, 0.0f) + kRest * radiance : radiance;
     }
     rowSum[static_cast<size_t>(y)] = sum / static_cast<double>(width_);
   });
   conditional_.resize((w + 1) * h);
   marginal_.resize(h + 1);
   std::vector<double> rowWeight(h);
-  const auto at = [&](int x, int y) {
-    return luminances[static_cast<size_t>(std::clamp(y, 0, height_ - 1)) * w +
-                      static_cast<size_t>((x + width_) % width_)];
-  };
   parallelRows(height_, [&](int y) {
-    float* cdf = &conditional_[static_cast<size_t>(y) * (w + 1)];
     const float sinTheta = std::sin(kPi * (static_cast<float>(y) + 0.5f) / static_cast<float>(height_));
-    std::vector<double> sum(w + 1, 0.0);
-    for (int x = 0; x < width_; ++x) {
-      double v = 0;
-      for (int dy = -1; dy <= 1; ++dy)
-        for (int dx = -1; dx <= 1; ++dx)
-          v += (dx ? 0.125 : 0.75) * (dy ? 0.125 : 0.75) * static_cast<double>(at(x + dx, y + dy));
-      sum[static_cast<size_t>(x) + 1] = sum[static_cast<size_t>(x)] + v;
-    }
-    rowWeight[static_cast<size_t>(y)] = sum[w] / static_cast<double>(w) * static_cast<double>(sinTheta);
-    for (size_t x = 0; x <= w; ++x)
-      cdf[x] = static_cast<float>(sum[w] > 0 ? sum[x] / sum[w] : static_cast<double>(x) / static_cast<double>(w));
+    float* cdf = &conditional_[static_cast<size_t>(y) * (w + 1)];
+    rowWeight[static_cast<size_t>(y)] = accumulateRow(luminances, y, cdf) * static_cast<double>(sinTheta);
   });
   double total = 0, sinTotal = 0;
   glm::dvec3 mean(0);

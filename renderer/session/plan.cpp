@@ -25,7 +25,22 @@ bool mayMissLight(const SceneTraits& t) {
          t.hasLobe(kLobeSpecular | kLobeTransmission | kLobeClearcoat);
 }
 
-void planUnreachable(const LightReach& reach, Plan& plan) {
+// Alpha of shadows follows from the light that camera paths find: what light paths bring has none.
+bool wantsShadowAlpha(const Scene& scene, const Settings& s) { return scene.data().ground && s.transparent; }
+bool hasShadowAlpha(const Integrator& i) {
+  const std::string_view name = i.name();
+  return name == "pt" || name == "crn";
+}
+
+// Whether `auto` runs it.
+Applies appliesHere(const Integrator& i, const Scene& scene, const Settings& settings, const LightReach& reach) {
+  if (!wantsShadowAlpha(scene, settings)) return i.applies(scene.traits(), reach);
+  if (!hasShadowAlpha(i)) return {false, "has no alpha of shadows (--ground --transparent)"};
+  if (i.name() == std::string_view("pt")) return {true, "its paths know the alpha of shadows (--ground --transparent)"};
+  return i.applies(scene.traits(), reach);
+}
+
+void planUnreachable(const LightReach& reach, bool shadowAlpha, Plan& plan) {
   double missed = 1;
   std::string names;
   for (const PlannedIntegrator& p : plan.integrators) {
@@ -35,8 +50,8 @@ void planUnreachable(const LightReach& reach, Plan& plan) {
   if (plan.integrators.empty() || missed < kMissedLight) return;
   plan.unreachable = fmt::format(
       "{:.3g} % of the light in view comes from lights without size over mirrors or through solids that refract, where "
-      "{} cannot find it: --integrator auto can",
-      100 * missed, names);
+      "{} cannot find it: --integrator auto can{}",
+      100 * missed, names, shadowAlpha ? ", without --transparent" : "");
   plan.lines.push_back({false, "light out of reach", plan.unreachable});
 }
 
@@ -48,6 +63,7 @@ void planIntegrators(const Scene& scene, const Settings& settings, const std::ve
   if (automatic || mayMissLight(scene.traits()))
     reach = measureLightReach(TransportContext(scene, settings.lightStrategy), plan.camera, settings.width,
                               settings.height);
+  const bool shadowAlpha = wantsShadowAlpha(scene, settings);
   std::string known;
   for (const Integrator* i : available) known += fmt::format("{}{}", known.empty() ? "" : ", ", i->name());
   for (const std::string& name : settings.integrators) {
@@ -55,20 +71,24 @@ void planIntegrators(const Scene& scene, const Settings& settings, const std::ve
     for (const Integrator* i : available) {
       if (name != "auto" && name != i->name()) continue;
       found = true;
+      const bool possible = !shadowAlpha || hasShadowAlpha(*i);
+      if (name != "auto" && !possible)
+        throw Error(ExitCode::Usage,
+                    "--ground --transparent: " + name + " has no alpha of shadows: use --integrator auto or pt");
       const bool planned = std::any_of(plan.integrators.begin(), plan.integrators.end(),
                                        [&](const PlannedIntegrator& p) { return p.integrator == i; });
       if (planned) continue;
       // An integrator asked for by name runs even where the scene does not need it; how light reaches what is in view
       // is not measured for it.
       const Applies applies =
-          name == "auto" ? i->applies(scene.traits(), reach) : Applies{true, "as --integrator says"};
-      const bool kept = applies.yes || settings.full;
+          name == "auto" ? appliesHere(*i, scene, settings, reach) : Applies{true, "as --integrator says"};
+      const bool kept = applies.yes || (settings.full && possible);
       plan.lines.push_back({kept, i->name(), applies.reason});
       if (kept) plan.integrators.push_back({i, 1});
     }
     if (!found) throw Error(ExitCode::Usage, "unknown integrator '" + name + "': known are auto, " + known);
   }
-  planUnreachable(reach, plan);
+  planUnreachable(reach, shadowAlpha, plan);
   if (plan.integrators.size() < 2) return;
   // The first one is the headline when nothing combines them. Photons are kept where unbiased images are led by
   // fireflies.
@@ -123,19 +143,11 @@ void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
                             : fmt::format("{} finite lights: chosen by power", finite)});
 }
 
-// Alpha of shadows follows from the light that camera paths find: what light paths bring has no alpha.
-void planGround(const Scene& scene, Plan& plan) {
-  Settings& s = plan.settings;
-  if (!scene.data().ground || !s.transparent) return;
-  if (isBlack(*scene.data().ground))
+void requireShadowAlpha(const Scene& scene, const Settings& settings) {
+  if (wantsShadowAlpha(scene, settings) && isBlack(*scene.data().ground))
     throw Error(
         ExitCode::Usage,
         "--ground --transparent: only lamps light the ground, which cannot tell shadow from distance: give --env");
-  for (std::string& name : s.integrators) {
-    if (name == "auto") name = "pt";
-    if (name != "pt" && name != "crn")
-      throw Error(ExitCode::Usage, "--ground --transparent: " + name + " has no alpha of shadows: use --integrator pt");
-  }
 }
 
 // What the view has that the file has not, and the lens.
@@ -230,7 +242,7 @@ Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& sett
   if (w.x0 < 0 || w.y0 < 0 || w.x1 > settings.width || w.y1 > settings.height || w.width() <= 0 || w.height() <= 0)
     throw Error(ExitCode::Usage, fmt::format("the crop {},{},{},{} is empty or outside the {}x{} frame", w.x0, w.y0,
                                              w.x1, w.y1, settings.width, settings.height));
-  planGround(scene, plan);
+  requireShadowAlpha(scene, settings);
   planIntegrators(scene, plan.settings, available, plan);
   planSceneParts(scene, settings, plan);
   planView(scene, plan);

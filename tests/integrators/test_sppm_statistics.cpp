@@ -8,7 +8,7 @@
 
 #include <doctest/doctest.h>
 
-#include "renderer/film/error_map.h"
+#include "combiners/statistics/error_map.h"
 #include "renderer/scene/data/gltf.h"
 #include "tests/support/render_fixture.h"
 

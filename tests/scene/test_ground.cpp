@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The ground of --ground: as bright as its backdrop where nothing shadows it, an ordinary floor elsewhere, and shadows
 // with the right alpha.
+#include <algorithm>
+
 #include <doctest/doctest.h>
 
+#include "renderer/film/files/exr.h"
 #include "renderer/scene/data/ground.h"
 #include "renderer/scene/data/scene_defaults.h"
 #include "tests/support/command_line.h"
@@ -161,14 +164,50 @@ TEST_CASE("Ground: with alpha, the picture over the backdrop is the picture with
   CHECK(std::fabs(r.alpha->at(0, 0)) < 0.15f);
 }
 
-TEST_CASE("--ground: seen by plan and header; what has no alpha of shadows is refused") {
+namespace {
+
+// A scene with caustics, lit by lamps and by an image that the folder is given.
+std::string sceneUnderSky(const Folder& folder) {
+  const std::string scenes = "'" BRAID_SOURCE_DIR "/scenes/";
+  REQUIRE(braidRun(folder, "render " + scenes + "sun_sky.glb' -q --size 8x4 --spp 1 --combine none -o sky.exr").code ==
+          0);
+  return scenes + "materials.glb' --env sky.exr --env-scale 0.01 --size 32x18 --spp 2 --ground ";
+}
+
+}  // namespace
+
+TEST_CASE("--ground --transparent: auto takes what has an alpha of shadows, and the plan says so") {
   const Folder folder;
-  const std::string scene = "'" BRAID_SOURCE_DIR "/scenes/materials.glb' ", small = "--size 32x18 --spp 1 --ground ";
-  CHECK(contains(braidRun(folder, "plan " + scene + small + "--env-scale 1").out, "+ ground: under the scene"));
-  const test::Run run =
-      braidRun(folder, "render " + scene + small + "--transparent --integrator bdpt -o o.exr --look-at 0,3,9,0,0,0");
-  CHECK(run.code == 1);
-  CHECK(contains(run.err, "--ground --transparent"));
+  const std::string scene = sceneUnderSky(folder);
+  const std::string opaque = braidRun(folder, "plan " + scene).out;
+  CHECK(contains(opaque, "+ ground: under the scene"));
+  CHECK(contains(opaque, "+ sppm: "));
+  for (const char* more : {"--transparent", "--transparent --full"}) {
+    const std::string plan = braidRun(folder, "plan " + scene + more).out;
+    CHECK(contains(plan, "+ pt: its paths know the alpha of shadows"));
+    for (const char* left : {"bdpt", "sppm", "gdpt", "vcm"})
+      CHECK(contains(plan, std::string("- ") + left + ": has no alpha of shadows (--ground --transparent)"));
+  }
+  const std::string render = "render " + scene + "-q --transparent --combine none -o ";
+  REQUIRE(braidRun(folder, render + "auto.exr --integrator auto").code == 0);
+  REQUIRE(braidRun(folder, render + "pt.exr --integrator pt").code == 0);
+  CHECK(readImage(folder.path / "auto.exr").planes.at("A").data ==
+        readImage(folder.path / "pt.exr").planes.at("A").data);
+}
+
+TEST_CASE("--ground --transparent: what has no alpha of shadows is refused in one line") {
+  const Folder folder;
+  const std::string scene = sceneUnderSky(folder);
+  const auto refusal = [&](const std::string& arguments) {
+    const test::Run run = braidRun(folder, "render " + arguments + " --transparent -o o.exr");
+    CHECK(run.code == 1);
+    CHECK(std::count(run.err.begin(), run.err.end(), '\n') == 1);
+    return run.err;
+  };
+  for (const std::string integrator : {"bdpt", "sppm", "gdpt", "vcm", "auto,sppm"})
+    CHECK(contains(refusal(scene + "--integrator " + integrator),
+                   "has no alpha of shadows: use --integrator auto or pt"));
+  CHECK(contains(refusal("'" BRAID_SOURCE_DIR "/scenes/materials.glb' --spp 1 --ground"), "give --env"));
 }
 
 }  // namespace braid::test_ground

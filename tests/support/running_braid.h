@@ -35,12 +35,12 @@ inline std::vector<Json> records(const fs::path& path, const std::string& event)
   return some;
 }
 
-// A command of braid on the Cornell box; what it prints goes to the test's own output or to the file named.
+// A command of braid on a scene, the Cornell box; what it prints goes to the test's own output or to the file named.
 class Process {
  public:
-  explicit Process(std::vector<std::string> words, const std::string& command = "render",
-                   const fs::path& printed = {}) {
-    words.insert(words.begin(), {BRAID_BINARY, command, kCornellFile, "-q"});
+  explicit Process(std::vector<std::string> words, const std::string& command = "render", const fs::path& printed = {},
+                   const std::string& scene = kCornellFile) {
+    words.insert(words.begin(), {BRAID_BINARY, command, scene, "-q"});
     if (command == "render") makePlain(words);
     std::vector<char*> arguments;
     for (std::string& w : words) arguments.push_back(w.data());

@@ -48,9 +48,10 @@ std::vector<Part> sortedParts(const std::vector<std::string>& files, bool quiet)
   for (size_t i = 1; i < parts.size(); ++i) {
     const std::string differs = difference(first.header.identity, parts[i].header.identity, false);
     if (!differs.empty())
-      throw Error(ExitCode::BadInput,
-                  fmt::format("{} and {} are not shares of one render: {}: render them with the same options",
-                              first.file, parts[i].file, differs));
+      throw Error(
+          ExitCode::BadInput,
+          fmt::format("{} and {} are not shares of one render: {}: render them with one braid and the same options",
+                      first.file, parts[i].file, differs));
     const std::string bits = difference(first.header.identity, parts[i].header.identity, true);
     if (!bits.empty() && !quiet) fmt::print(stderr, "note: {} and {}: {}\n", first.file, parts[i].file, bits);
     for (size_t j = 0; j < i; ++j) {

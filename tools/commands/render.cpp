@@ -2,7 +2,7 @@
 // `braid render`: a glTF scene to a multilayer EXR, to a state that can be resumed, or to one machine's share of it.
 #include <CLI/CLI.hpp>
 
-#include "tools/commands/render_run.h"
+#include "tools/render/render_run.h"
 #include "tools/options/cli.h"
 #include "tools/options/syntax/help.h"
 #include "tools/options/syntax/option_checks.h"

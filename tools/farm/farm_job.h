@@ -55,8 +55,7 @@ std::string shellQuoted(const std::string& text);
 
 // The whole job:
 //   slurm     bash script that submits an array and the merge (sbatch, afterok); with frames an array over them for
-//   every
-//             share, and one of merges whose tasks wait for theirs (aftercorr)
+//             every share, and one of merges whose tasks wait for theirs (aftercorr)
 //   opencue   Python script that launches an outline of two layers; with frames one a share and one of merges
 //   flamenco  JavaScript job type for the Manager's folder `scripts`
 //   make      Makefile

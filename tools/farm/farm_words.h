@@ -32,7 +32,8 @@ std::string slurmThreads(const FarmJob& job);
 std::string jobName(const FarmJob& job);
 std::string jobTitle(const FarmJob& job);
 
-// The script of FarmFormat::OpenCue, and those of frames for this one and Slurm.
+// The scripts of FarmFormat::Flamenco and OpenCue, and those of frames for the latter and Slurm.
+std::string flamencoText(const FarmJob& job, const std::vector<PassInterval>& shares);
 std::string openCueText(const FarmJob& job, const std::vector<PassInterval>& shares);
 std::string openCueFramesText(const FarmJob& job, const std::vector<PassInterval>& shares);
 std::string slurmFramesText(const FarmJob& job, const std::vector<PassInterval>& shares);

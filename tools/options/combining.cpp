@@ -16,7 +16,7 @@
 #include "combiners/pipeline/registry.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
-#include "renderer/film/error_map.h"
+#include "combiners/statistics/error_map.h"
 #include "renderer/film/make_attribute.h"
 #include "tools/options/syntax/help.h"
 #include "tools/options/syntax/option_checks.h"

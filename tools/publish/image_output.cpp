@@ -11,7 +11,7 @@
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 #include "renderer/core/stopwatch.h"
-#include "renderer/film/error_map.h"
+#include "combiners/statistics/error_map.h"
 #include "renderer/film/files/output_file.h"
 #include "renderer/film/files/picture.h"
 #include "renderer/film/make_attribute.h"
@@ -53,6 +53,16 @@ void bothWhateverFails(const std::function<void()>& one, const std::function<voi
   parallelBoth([&] { caught(one, failures[0]); }, [&] { caught(other, failures[1]); });
   for (const std::exception_ptr& failure : failures)
     if (failure) std::rethrow_exception(failure);
+}
+
+std::vector<std::string> timingsOf(const PipelineResult& combined) {
+  std::vector<std::string> timings;
+  for (const PipelineOutput& out : combined.outputs)
+    if (out.ran())
+      timings.push_back(fmt::format("{} in {}, its inputs in {}; its mean is {:.2f} % of that of {}", out.step.name,
+                                    formatSeconds(out.seconds), formatSeconds(out.inputSeconds),
+                                    100 * out.meanOverUnbiased, out.step.unbiased));
+  return timings;
 }
 
 }  // namespace
@@ -224,11 +234,7 @@ WrittenImage writeImage(const ImageOutput& o, Estimates& estimates, const Plane<
     if (!warning.empty()) written.warnings.push_back(std::move(warning));
     written.writeSeconds = writing.seconds();
   });
-  for (const PipelineOutput& out : combined.outputs)
-    if (out.ran())
-      written.timings.push_back(fmt::format("{} in {}, its inputs in {}; its mean is {:.2f} % of that of {}",
-                                            out.step.name, formatSeconds(out.seconds), formatSeconds(out.inputSeconds),
-                                            100 * out.meanOverUnbiased, out.step.unbiased));
+  written.timings = timingsOf(combined);
   return written;
 }
 

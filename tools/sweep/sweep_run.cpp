@@ -8,7 +8,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/stopwatch.h"
-#include "renderer/film/error_map.h"
+#include "combiners/statistics/error_map.h"
 #include "tools/publish/estimated_error.h"
 
 namespace braid {

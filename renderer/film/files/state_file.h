@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // FilmState in a file: to go on after an interruption, and to bring the shares of several machines together.
 //
-//   braid-state 1 HEADERBYTES PLANEBYTES     one line
-//   header                                   lines of words: identity, options, estimates with their passes, plane
-//   table planes                                   little-endian float64 or float32, row-major, in the order of the
-//   table checksum                                 16 hexadecimal digits of all that comes before, and a newline
+//   braid-state 3 HEADERBYTES PLANEBYTES   one line
+//   header          lines of words: identity, options, estimates with their passes, table of planes
+//   planes          little-endian float64 or float32, row-major, in the order of that table
+//   checksum        16 hexadecimal digits of all that comes before, and a newline
 //
 // The first line lets a reader see at once, from the size of the file, that it is whole; nothing is allocated before.
 #pragma once

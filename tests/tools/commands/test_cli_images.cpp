@@ -4,7 +4,7 @@
 
 #include <doctest/doctest.h>
 
-#include "renderer/film/error_map.h"
+#include "combiners/statistics/error_map.h"
 #include "renderer/film/files/exr.h"
 #include "tests/support/command_line.h"
 #include "tests/support/gltf_fixture.h"

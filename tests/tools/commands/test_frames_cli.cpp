@@ -3,10 +3,13 @@
 #include <doctest/doctest.h>
 
 #include <csignal>
+#include <memory>
+
+#include <fmt/format.h>
 
 #include "renderer/film/files/exr.h"
 #include "renderer/film/files/state_file.h"
-#include "tests/support/command_line.h"
+#include "tests/support/running_braid.h"
 
 namespace braid::test_frames_cli {
 
@@ -96,6 +99,47 @@ TEST_CASE("An unfinished frame goes on from its checkpoint, without being told")
   const std::string share = "render " + kOptions + "--checkpoint s_#.state --log-json log" + frames;
   must(folder, share);
   CHECK_FALSE(contains(bytes(folder, "log"), R"("finished":false)"));
+}
+
+TEST_CASE("Frames that are killed are gone on from, and equal those of a run that was not") {
+  const Folder folder;
+  const std::string scene = movingScene(folder);
+  const auto named = [&](const char* stem, const std::string& number, const char* ending) {
+    return fmt::format("{}/{}_{}{}", folder.path.string(), stem, number, ending);
+  };
+  const auto start = [&](const char* stem, std::vector<std::string> more) {
+    more.insert(more.end(),
+                {"--size", "48x32", "--spp", "64", "--threads", "2", "--reproducible", "--look-at",
+                 "0.5,0.5,3,0.5,0.5,0", "--frames", "0:24", "--fps", "24", "-o", named(stem, "##", ".exr")});
+    return std::make_unique<test::Process>(more, "render", "", scene);
+  };
+  const auto startAgain = [&](const std::string& log) {
+    return start("out", {"--checkpoint", named("s", "##", ".state"), "--save-every", "0.02", "--log-json", log});
+  };
+  CHECK(start("whole", {})->wait() == 0);
+  int finished = 0, resumed = 0;
+  uint64_t kept = 0;  // passes of the frame that comes next
+  for (const auto& [frame, signal] : {std::pair(3, SIGKILL), {8, SIGTERM}, {14, SIGKILL}, {20, SIGTERM}, {24, 0}}) {
+    const std::string number = fmt::format("{:02}", frame), log = named("log", number, ""),
+                      state = named("s", number, ".state");
+    const auto process = startAgain(log);
+    if (signal != 0) {
+      REQUIRE(test::waitUntil([&] { return std::filesystem::exists(state); }));
+      process->signal(signal);
+    }
+    CHECK(process->wait() == (signal == SIGKILL ? -SIGKILL : signal == SIGTERM ? 130 : 0));
+    for (const test::Json& r : test::records(log, "frame")) CHECK(r["finished"] == (r["frame"] < finished));
+    // The first round of the frame that was cut off, unless it was finished just before.
+    if (kept > 0 && kept < 64) resumed += test::records(log, "progress").at(0)["spp"] > kept;
+    finished = frame + (signal != 0 && std::filesystem::exists(named("out", number, ".exr")));
+    kept = signal != 0 ? readStateHeader(state).rounds() : 0;
+  }
+  CHECK(resumed > 0);
+  for (int i = 0; i < 24; ++i) {
+    const std::string number = fmt::format("{:02}", i);
+    CHECK(readText(named("out", number, ".exr")) == readText(named("whole", number, ".exr")));
+    CHECK_FALSE(std::filesystem::exists(named("out", number, ".part.exr")));
+  }
 }
 
 TEST_CASE("An interruption ends all frames and leaves no image under a finished one's name") {

@@ -6,7 +6,7 @@
 
 #include <doctest/doctest.h>
 
-#include "renderer/film/error_map.h"
+#include "combiners/statistics/error_map.h"
 #include "renderer/film/film.h"
 #include "tools/publish/estimated_error.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/commands/render_run.h"
+#include "tools/render/render_run.h"
 
 #include <cstdio>
 #include <filesystem>
@@ -9,8 +9,8 @@
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
 #include "renderer/film/files/output_file.h"
-#include "tools/commands/render_report.h"
-#include "tools/commands/render_state.h"
+#include "tools/render/render_report.h"
+#include "tools/render/render_state.h"
 #include "tools/images/exr_metadata.h"
 #include "tools/options/file_uses.h"
 #include "tools/options/output_options.h"

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "renderer/session/session.h"
-#include "tools/commands/render_options.h"
+#include "tools/render/render_options.h"
 #include "tools/options/open_scene.h"
 #include "tools/publish/publisher.h"
 #include "tools/run/progress_line.h"

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "renderer/film/film_state.h"
-#include "tools/commands/render_options.h"
+#include "tools/render/render_options.h"
 
 namespace braid {
 

@@ -6,8 +6,8 @@
 
 #include "renderer/core/error.h"
 #include "renderer/scene/data/scene_defaults.h"
-#include "tools/commands/render_run.h"
-#include "tools/commands/render_state.h"
+#include "tools/render/render_run.h"
+#include "tools/render/render_state.h"
 #include "tools/options/turntable.h"
 #include "tools/run/run_clock.h"
 

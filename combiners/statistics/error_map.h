@@ -11,7 +11,7 @@ namespace braid {
 // sign from pixel to pixel along edges. Zero for estimates without a bias plane.
 Plane<float> squaredBias(const Estimate& estimate);
 
-// Whether there are passes and a variance to tell an error by.
+// Whether there are passes and a variance to estimate an error by.
 bool knowsError(const Estimate& estimate);
 
 // Estimated squared error of the mean, averaged over the channels: variance + squaredBias().

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "renderer/images/open_images.h"
-#include "tools/commands/render_options.h"
+#include "tools/render/render_options.h"
 #include "tools/options/open_scene.h"
 #include "tools/publish/publisher.h"
 #include "tools/run/interrupt.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/commands/render_report.h"
+#include "tools/render/render_report.h"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/commands/render_state.h"
+#include "tools/render/render_state.h"
 
 #include <algorithm>
 #include <filesystem>
