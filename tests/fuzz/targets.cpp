@@ -122,7 +122,9 @@ void gltf(Input input) {
   expectingErrors([&] { loadGltf(path, options); });
 }
 
-void texture(Input input) {
+namespace {
+
+void sampleTexture(Input input) {
   expectingErrors([&] {
     const auto decoded = decodeImage(input.data(), input.size(), "fuzz");
     for (const float v : decoded->floats) require(std::isfinite(v) && v >= 0, "a texel is not finite");
@@ -130,6 +132,18 @@ void texture(Input input) {
     for (const Vec2 uv : {Vec2(0), Vec2(1), Vec2(-1e30f, 0.5f), Vec2(NAN, 2.5f)})
       require(std::isfinite(sampler.sample(uv).x), "a sample of a texture is not finite");
   });
+}
+
+}  // namespace
+
+void texture(Input input) { sampleTexture(input); }
+
+void ktx2(Input input) {
+  constexpr size_t kWidth = 20, kHeight = 24, kBytes = 4;
+  std::vector<uint8_t> file(input.begin(), input.end());
+  for (const size_t side : {kWidth, kHeight})
+    for (size_t i = side + 1; i < std::min(side + kBytes, file.size()); ++i) file[i] = 0;
+  sampleTexture(file);
 }
 
 void image(Input input) {
@@ -177,8 +191,8 @@ void weights(Input input) {
 }
 
 const std::vector<Target>& targets() {
-  static const std::vector<Target> all{
-      {"gltf", gltf}, {"texture", texture}, {"image", image}, {"state", state}, {"weights", weights}};
+  static const std::vector<Target> all{{"gltf", gltf},   {"texture", texture}, {"ktx2", ktx2},
+                                       {"image", image}, {"state", state},     {"weights", weights}};
   return all;
 }
 

@@ -19,6 +19,8 @@ using Input = std::span<const uint8_t>;
 void gltf(Input input);
 // An encoded image: of a texture or an environment.
 void texture(Input input);
+// A KTX2 texture whose sides are cut to 255 texels: large flat pictures in short files are legal, and slow.
+void ktx2(Input input);
 // An image file given to `combine` or `compare`: EXR, by braid or others.
 void image(Input input);
 // A state file: header up to the first zero byte, planes behind it; the first line and the checksum are put right.

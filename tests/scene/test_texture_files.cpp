@@ -238,7 +238,7 @@ TEST_CASE("texture: what cannot be decoded is an error of one line") {
   CHECK(reason({1, 2, 3, 4}).find("known format") != std::string::npos);
   CHECK(reason(std::vector<uint8_t>(kGammaPng.begin(), kGammaPng.begin() + 60)) != "");
   CHECK(reason(kBombPng).find("more than 2^28") != std::string::npos);
-  CHECK(reason({0xAB, 'K', 'T', 'X', ' ', '2', '0', 0xBB}).find("KTX2") != std::string::npos);
+  CHECK(reason({0xAB, 'K', 'T', 'X', ' ', '2', '0', 0xBB, '\r', '\n', 0x1A, '\n'}).find("KTX2") != std::string::npos);
   CHECK_THROWS_AS(readImageFile("/no/such/image.png"), Error);
 }
 

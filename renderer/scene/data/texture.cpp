@@ -10,16 +10,14 @@
 #include <system_error>
 
 #include "renderer/core/error.h"
-#include "renderer/core/image_limits.h"
 #include "renderer/images/image_codecs.h"
+#include "renderer/scene/data/image_checks.h"
+#include "renderer/scene/data/ktx2_image.h"
 #include "renderer/scene/data/webp.h"
 
 namespace braid {
 
 namespace {
-
-constexpr float kLargestRadiance = 1e18f;  // its square is a float, too
-constexpr uint64_t kMaxPixels = uint64_t(1) << 28;
 
 float srgbToLinear(float v) { return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f); }
 
@@ -126,8 +124,6 @@ std::string formatName(const uint8_t* data, size_t bytes) {
   if (begins("\x76\x2f\x31\x01", 4)) return "image.exr";
   if (begins("II*\0", 4) || begins("MM\0*", 4)) return "image.tif";
   if (begins("BM", 2)) return "image.bmp";
-  if (begins("\xABKTX 20", 7))
-    throw Error(ExitCode::BadInput, "is a KTX2 image, which is not supported; convert it to PNG, JPEG or WebP");
   throw Error(ExitCode::BadInput, "is not an image of a known format; save it as PNG or JPEG");
 }
 
@@ -189,28 +185,11 @@ std::shared_ptr<Image> readPixels(ImageReader& reader, const std::string& name, 
   }
   if (!reader.readImage(image->channels, isByte ? SampleType::Byte : SampleType::Float, out))
     throw Error(ExitCode::BadInput, "is a broken image (" + oneLine(reader.takeError()) + "); save it again");
-  for (float& v : image->floats) {
-    const float meant = std::isfinite(v) ? std::clamp(v, 0.0f, kLargestRadiance) : 0.0f;
-    image->limited += meant != v;
-    v = meant;
-  }
+  limitFloats(*image);
   return image;
 }
 
 }  // namespace
-
-void checkImageSize(int width, int height, int channels, uint64_t fileBytes) {
-  const std::string size = std::to_string(width) + " x " + std::to_string(height);
-  if (width < 1 || height < 1 || channels < 1)
-    throw Error(ExitCode::BadInput, "is an image of " + size + " pixels; save it as a flat picture");
-  const uint64_t pixels = static_cast<uint64_t>(width) * static_cast<uint64_t>(height);
-  if (pixels > kMaxPixels)
-    throw Error(ExitCode::BadInput, "is an image of " + size + " pixels, more than 2^28; make it smaller");
-  if (!canHold(fileBytes, pixels * static_cast<uint64_t>(channels))) {
-    throw Error(ExitCode::BadInput, "claims " + size + " pixels in " + std::to_string(fileBytes) +
-                                        " bytes, which cannot be: it is damaged; save it again");
-  }
-}
 
 Texture::Texture(std::shared_ptr<const Image> image, bool srgb, Wrap wrapU, Wrap wrapV, Filter filter)
     : image_(std::move(image)), srgb_(srgb), wrapU_(wrapU), wrapV_(wrapV), filter_(filter) {
@@ -287,6 +266,7 @@ size_t Texture::bytes() const { return image_ ? image_->bytes.size() + image_->f
 std::shared_ptr<const Image> decodeImage(const uint8_t* data, size_t bytes, const std::string& name) {
   if (bytes == 0) throw Error(ExitCode::BadInput, "is an empty image; save it again");
   if (isWebp(data, bytes)) return decodeWebp(data, bytes, name);
+  if (isKtx2(data, bytes)) return decodeKtx2(data, bytes, name);
   const std::unique_ptr<ImageReader> reader = openReader(formatName(data, bytes), data, bytes);
   const std::shared_ptr<Image> image = readPixels(*reader, name, bytes);
   if (image->hasAlpha() && isAssociated(*reader)) divideByAlpha(*image);
@@ -295,10 +275,15 @@ std::shared_ptr<const Image> decodeImage(const uint8_t* data, size_t bytes, cons
 
 namespace {
 
-bool beginsAsWebp(const std::string& path) {
+// The decoder of formats that OpenImageIO does not read as they are meant; null for all others.
+auto ownDecoder(const std::string& path) -> decltype(&decodeWebp) {
   std::array<char, 12> first{};
   std::ifstream in(path, std::ios::binary);
-  return in.read(first.data(), first.size()) && isWebp(reinterpret_cast<const uint8_t*>(first.data()), first.size());
+  if (!in.read(first.data(), first.size())) return nullptr;
+  const auto* bytes = reinterpret_cast<const uint8_t*>(first.data());
+  if (isWebp(bytes, first.size())) return decodeWebp;
+  if (isKtx2(bytes, first.size())) return decodeKtx2;
+  return nullptr;
 }
 
 }  // namespace
@@ -308,11 +293,11 @@ std::shared_ptr<const Image> readImageFile(const std::string& path) {
   if (!std::filesystem::is_regular_file(path, ignored))
     throw Error(ExitCode::BadInput, path + ": is not a file that can be read; check the path");
   try {
-    if (beginsAsWebp(path)) {
+    if (const auto decode = ownDecoder(path)) {
       std::ifstream in(path, std::ios::binary);
       const std::string file{std::istreambuf_iterator<char>(in), {}};
       if (in.bad()) throw Error(ExitCode::BadInput, "cannot be read; check its permissions");
-      return decodeWebp(reinterpret_cast<const uint8_t*>(file.data()), file.size(), path);
+      return decode(reinterpret_cast<const uint8_t*>(file.data()), file.size(), path);
     }
     return readPixels(*openReader(path, nullptr, 0), path, std::filesystem::file_size(path, ignored));
   } catch (const Error& error) {

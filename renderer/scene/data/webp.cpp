@@ -7,6 +7,7 @@
 #include <webp/demux.h>
 
 #include "renderer/core/error.h"
+#include "renderer/scene/data/image_checks.h"
 
 namespace braid {
 

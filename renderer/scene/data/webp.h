@@ -15,7 +15,4 @@ bool isWebp(const uint8_t* data, size_t bytes);
 // Error(BadInput) with a one-line reason.
 std::shared_ptr<const Image> decodeWebp(const uint8_t* data, size_t bytes, const std::string& name);
 
-// Refuses sizes that no image of `fileBytes` bytes can have, or that are beyond what is read: Error(BadInput).
-void checkImageSize(int width, int height, int channels, uint64_t fileBytes);
-
 }  // namespace braid

@@ -209,18 +209,21 @@ class MaterialReader {
 
 }  // namespace
 
-int imageOf(const tinygltf::Texture& texture) {
-  const int webp = index(member(texture.extensions, "EXT_texture_webp"), "source");
-  return webp >= 0 ? webp : texture.source;
+std::vector<int> imagesOf(const tinygltf::Texture& texture) {
+  std::vector<int> images = {index(member(texture.extensions, "KHR_texture_basisu"), "source"),
+                             index(member(texture.extensions, "EXT_texture_webp"), "source"), texture.source};
+  std::erase_if(images, [](int image) { return image < 0; });
+  return images;
 }
 
 void readMaterials(Document& document) {
   const std::vector<tinygltf::Material>& list = document.model.materials;
   MaterialReader reader(document);
   for (size_t i = 0; i < document.model.textures.size(); ++i) {
-    if (imageOf(document.model.textures[i]) < 0)
-      document.report.warn("/textures/" + std::to_string(i),
-                           "has no image in a format that is supported (PNG, JPEG, WebP); factors alone are used");
+    if (imagesOf(document.model.textures[i]).empty())
+      document.report.warn(
+          "/textures/" + std::to_string(i),
+          "has no image in a format that is supported (PNG, JPEG, WebP, KTX2); factors alone are used");
   }
   for (size_t i = 0; i < list.size(); ++i) {
     document.materials.push_back(reader.read(list[i], "/materials/" + std::to_string(i)));

@@ -8,11 +8,9 @@
 #include <vector>
 
 #include "renderer/scene/gltf/document/gltf_document.h"
+#include "renderer/scene/gltf/gltf_images.h"
 
 namespace braid::gltf {
-
-// The image that a texture reads, WebP where there is a choice; -1: none in a supported format.
-int imageOf(const tinygltf::Texture& texture);
 
 // The materials of the kept primitives, in order of first use, with compacted texture and uv indices.
 class MaterialTable {
@@ -39,7 +37,7 @@ class MaterialTable {
 
  private:
   Uvs assignUvSlots(Material& material, int fileMaterial);
-  std::vector<int> usedImages() const;
+  std::shared_ptr<const Image> pixels(const DecodedImage& decoded, int fileTexture, bool isColour, bool isNormal);
   void dropMissingTextures();
 
   Document& document_;

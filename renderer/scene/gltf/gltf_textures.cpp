@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kept materials: uv slots, texture indices, and decoding of the images they read.
+// Kept materials: uv slots, texture indices, and the textures they read.
 #include <algorithm>
-#include <atomic>
 #include <set>
 
-#include "renderer/core/parallel.h"
 #include "renderer/scene/gltf/gltf_material.h"
 
 namespace braid::gltf {
@@ -57,45 +55,6 @@ void dropUnreadTextures(Material& m) {
   });
 }
 
-// Small files can hold huge empty pictures: bounds what all of them together may take.
-class PixelBudget {
- public:
-  explicit PixelBudget(uint64_t sourceBytes) : limit_(kAlways + kTimesSource * sourceBytes) {}
-  bool spent() const { return used_ > limit_; }
-  void add(uint64_t bytes) { used_ += bytes; }
-
- private:
-  static constexpr uint64_t kAlways = uint64_t(8) << 30, kTimesSource = 256;
-  uint64_t limit_;
-  std::atomic<uint64_t> used_{0};
-};
-
-void decode(const Document& document, const ImageSource& source, PixelBudget& budget, DecodedImage& out) {
-  if (budget.spent()) {
-    out.problem = "is one image too many: together they take too much memory; make them smaller";
-    return;
-  }
-  if (source.view >= 0) {
-    out.encoded = document.views[static_cast<size_t>(source.view)].data;
-    if (out.encoded.empty()) return;  // reported with the view
-  } else {
-    if (source.uri.empty()) return;  // reported with the image
-    std::optional<std::vector<uint8_t>> data = document.files.read(source.uri, out.problem, out.note);
-    if (!data) return;
-    out.file = std::move(*data);
-    out.encoded = out.file;
-  }
-  const bool named = source.view < 0 && !isDataUri(source.uri);
-  try {
-    out.image = decodeImage(out.encoded.data(), out.encoded.size(), named ? source.uri : source.name);
-    budget.add(out.image->bytes.size() + out.image->floats.size() * sizeof(float));
-  } catch (const Error& error) {
-    // That the codecs cannot be opened is no fault of the image.
-    if (error.code() != ExitCode::BadInput) throw;
-    out.problem = error.what();
-  }
-}
-
 }  // namespace
 
 MaterialTable::Uvs MaterialTable::assignUvSlots(Material& material, int fileMaterial) {
@@ -144,7 +103,7 @@ uint32_t MaterialTable::use(int fileMaterial) {
     document_.usage.mark("textures", ref.texture);
     document_.usage.mark("samplers", texture.sampler);
     // One in an unsupported format was warned about: the factor alone stays.
-    if (imageOf(texture) < 0) ref = {};
+    if (imagesOf(texture).empty()) ref = {};
   });
   uvs_.push_back(assignUvSlots(material, fileMaterial));
   forEachTexture(material, [&](TextureRef& ref, bool isColour, bool) {
@@ -156,57 +115,37 @@ uint32_t MaterialTable::use(int fileMaterial) {
   return placed;
 }
 
-std::vector<int> MaterialTable::usedImages() const {
-  std::set<int> used;
-  for (const auto& [key, number] : textures_) {
-    const tinygltf::Texture& texture = document_.model.textures[static_cast<size_t>(key.first)];
-    used.insert(imageOf(texture));
+std::shared_ptr<const Image> MaterialTable::pixels(const DecodedImage& decoded, int fileTexture, bool isColour,
+                                                   bool isNormal) {
+  if (!decoded.ktx2) return decoded.image;
+  if (decoded.ktx2->srgb != isColour && decoded.image->floats.empty()) {
+    document_.report.warn("/textures/" + std::to_string(fileTexture),
+                          isColour
+                              ? "the KTX2 file says that its colours are linear; as glTF demands, they are read as sRGB"
+                              : "the KTX2 file says that it holds sRGB colours; as glTF demands, they are read as "
+                                "linear");
   }
-  return {used.begin(), used.end()};
+  return isNormal && decoded.ktx2->isRedGreen ? withNormalZ(*decoded.image) : decoded.image;
 }
 
 void MaterialTable::loadTextures() {
-  std::vector<DecodedImage>& decoded = document_.decoded;
-  decoded.resize(document_.images.size());
-  // Two entries for one file or view share its pixels.
-  std::map<std::pair<std::string_view, int>, int> firstOf;
-  std::vector<int> unique;
-  for (const int image : usedImages()) {
-    const ImageSource& source = document_.images[static_cast<size_t>(image)];
-    document_.usage.mark("images", image);
-    document_.useView(source.view);
-    if (firstOf.emplace(std::pair<std::string_view, int>(source.uri, source.view), image).second)
-      unique.push_back(image);
-  }
-  PixelBudget budget(document_.sourceBytes);
-  parallelFor(unique.size(), [&](size_t i) {
-    const auto image = static_cast<size_t>(unique[i]);
-    if (!decoded[image].done) decode(document_, document_.images[image], budget, decoded[image]);
-    decoded[image].done = true;
-  });
-  for (const int image : unique) {
-    const DecodedImage& item = decoded[static_cast<size_t>(image)];
-    const std::string place = "/images/" + std::to_string(image);
-    if (!item.problem.empty()) document_.report.problem(place, item.problem, "factors alone are used");
-    if (!item.note.empty()) document_.report.problem(place, item.note, "that file is read");
-    if (item.image && item.image->limited > 0)
-      document_.report.warn(place, std::to_string(item.image->limited) +
-                                       " values are not finite, negative or above 1e18; they are limited");
-    if (item.image && document_.images[static_cast<size_t>(image)].view < 0)
-      document_.hash.add(item.encoded.data(), item.encoded.size());
-  }
+  std::set<int> used;
+  for (const auto& [key, number] : textures_) used.insert(key.first);
+  const ImageTable images(document_, used);
+  std::set<int32_t> normals;
+  for (const Material& m : scene_.materials)
+    normals.insert({m.normalTexture.texture, m.clearcoatNormalTexture.texture});
   scene_.textures.resize(textures_.size());
   for (const auto& [key, number] : textures_) {
-    const tinygltf::Texture& texture = document_.model.textures[static_cast<size_t>(key.first)];
-    const ImageSource& image = document_.images[static_cast<size_t>(imageOf(texture))];
-    const std::shared_ptr<const Image>& pixels =
-        decoded[static_cast<size_t>(firstOf.at({image.uri, image.view}))].image;
-    if (!pixels) continue;
+    const auto [fileTexture, isColour] = key;
+    const DecodedImage* decoded = images.of(fileTexture);
+    if (!decoded) continue;
+    const tinygltf::Texture& texture = document_.model.textures[static_cast<size_t>(fileTexture)];
     const tinygltf::Sampler sampler =
         texture.sampler < 0 ? tinygltf::Sampler() : document_.model.samplers[static_cast<size_t>(texture.sampler)];
-    scene_.textures[static_cast<size_t>(number)] =
-        Texture(pixels, key.second, wrapOf(sampler.wrapS), wrapOf(sampler.wrapT),
-                sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST ? Filter::Nearest : Filter::Linear);
+    scene_.textures[static_cast<size_t>(number)] = Texture(
+        pixels(*decoded, fileTexture, isColour, normals.contains(number)), isColour, wrapOf(sampler.wrapS),
+        wrapOf(sampler.wrapT), sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST ? Filter::Nearest : Filter::Linear);
   }
   dropMissingTextures();
 }

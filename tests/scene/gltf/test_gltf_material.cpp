@@ -214,15 +214,15 @@ TEST_CASE("gltf: samplers, and textures in formats that cannot be read") {
   const int texture = addTexture(file);
   file.root["samplers"] = {{{"wrapS", 33071}, {"wrapT", 33648}, {"magFilter", 9728}}};
   file.root["textures"][static_cast<size_t>(texture)]["sampler"] = 0;
-  const int basis = file.append("textures", {{"extensions", {{"KHR_texture_basisu", {{"source", 0}}}}}});
-  file.root["extensionsUsed"] = {"KHR_texture_basisu"};
+  const int other = file.append("textures", {{"extensions", {{"ACME_texture", {{"source", 0}}}}}});
+  file.root["extensionsUsed"] = {"ACME_texture"};
   giveMaterial(file, {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}},
-                      {"normalTexture", {{"index", basis}}}});
+                      {"normalTexture", {{"index", other}}}});
   const SceneData scene = file.load();
   CHECK(scene.materials[0].baseColorTexture);
   CHECK_FALSE(scene.materials[0].normalTexture);
   CHECK(hasWarning(scene, "/textures/1: has no image in a format that is supported"));
-  CHECK(scene.extensionsIgnored == std::vector<std::string>{"KHR_texture_basisu"});
+  CHECK(scene.extensionsIgnored == std::vector<std::string>{"ACME_texture"});
 }
 
 TEST_CASE("gltf: EXT_texture_webp takes precedence over the fallback image") {

@@ -22,6 +22,7 @@
 
 #include "renderer/core/hash.h"
 #include "renderer/scene/data/gltf.h"
+#include "renderer/scene/data/ktx2_image.h"
 #include "renderer/scene/gltf/document/gltf_files.h"
 #include "renderer/scene/gltf/document/gltf_report.h"
 #include "renderer/scene/data/scene_data.h"
@@ -56,6 +57,7 @@ struct DecodedImage {
   std::vector<uint8_t> file;  // of an external image
   Bytes encoded;
   std::shared_ptr<const Image> image;
+  std::optional<Ktx2Facts> ktx2;  // if it is a KTX2 texture
   std::string problem, note;
 };
 

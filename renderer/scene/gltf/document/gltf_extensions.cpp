@@ -16,7 +16,7 @@ namespace {
 constexpr std::array kRendered = {
     "EXT_mesh_gpu_instancing", "EXT_meshopt_compression", "EXT_texture_webp",      "KHR_draco_mesh_compression",
     "KHR_lights_punctual",     "KHR_materials_variants",  "KHR_mesh_quantization", "KHR_meshopt_compression",
-    "KHR_node_visibility",     "KHR_texture_transform",
+    "KHR_node_visibility",     "KHR_texture_basisu",      "KHR_texture_transform",
 };
 
 // No pixel depends on them: metadata, feature ids, outlines, levels of detail beside the finest, interaction, sound,
@@ -100,10 +100,9 @@ void checkExtensions(Document& document, const nlohmann::json& root) {
       document.report.warn(place, "extension " + quoted(name) + " is required but ignored, as --ignore-extension says");
       continue;
     }
-    const std::string mend =
-        name == "KHR_texture_basisu" ? "export the textures as PNG, JPEG or WebP" : "export the file without it";
-    unsupported.push_back(
-        {place, "extension " + quoted(name) + " is not supported; " + mend + ", or give --ignore-extension " + name});
+    unsupported.push_back({place, "extension " + quoted(name) +
+                                      " is not supported; export the file without it, or give --ignore-extension " +
+                                      name});
   }
   if (!unsupported.empty()) throw SceneError(ExitCode::UnsupportedExtension, document.path, std::move(unsupported));
   std::string ignored;
