@@ -184,7 +184,12 @@ chmod +x flaky
 frames=(--frames 0:24 --fps 24)
 "$braid" plan moving.glb -q "${options[@]}" "${frames[@]}" --spp 8 --threads 1 --tasks 2 --format slurm \
   --program "$work/job/flaky" -o "f_##.exr" >frames.sh
-merges() { bash frames.sh | tee -a /dev/stderr | sed -E 's/.* ([0-9]+) *$/\1/'; }
+merges() { # the job of merges
+  local line
+  line=$(bash frames.sh)
+  echo "  $line" >&2
+  sed -E 's/.* ([0-9]+) *$/\1/' <<<"$line"
+}
 ended() { ! squeue -h -j "$1" 2>/dev/null | grep -q .; }
 merge=$(merges)
 for ((i = 0; i < 600; ++i)); do ended "$merge" && break; sleep 0.2; done
