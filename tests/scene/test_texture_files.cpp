@@ -13,6 +13,7 @@
 #include "renderer/core/error.h"
 #include "renderer/film/files/exr.h"
 #include "renderer/scene/data/texture.h"
+#include "tests/support/ktx2_writer.h"
 
 namespace braid::test_texture_files {
 
@@ -221,6 +222,23 @@ TEST_CASE("texture: EXR texels that are not finite become 0") {
   const std::vector<uint8_t> bytes =
       encoded(".exr", OIIO::ImageSpec(2, 1, 3, OIIO::TypeDesc::FLOAT), OIIO::TypeDesc::FLOAT, pixels);
   CHECK(decodeImage(bytes.data(), bytes.size(), "hdr")->floats == std::vector<float>{1, 0, 3, 0, 5, 6});
+}
+
+TEST_CASE("texture: KTX2 files are read by path, as environments are") {
+  test::Ktx2Writer file;
+  file.vkFormat = 109;
+  file.width = 1;
+  file.height = 1;
+  file.levels[0] = {0, 0, 0x80, 0x3F, 0, 0, 0, 0x40, 0, 0, 0x80, 0x3E, 0, 0, 0x80, 0x3F};  // 1, 2, 1/4, 1
+  const fs::path path = fs::temp_directory_path() / ("braid-test-" + std::to_string(::getpid()) + ".ktx2");
+  const auto bytes = file.file();
+  std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), std::ssize(bytes));
+  const auto image = readImageFile(path.string());
+  CHECK(image->floats == std::vector<float>{1, 2, 0.25f, 1});
+  CHECK_FALSE(image->integerFloats);
+  fs::resize_file(path, bytes.size() - 1);
+  CHECK_THROWS_WITH_AS(readImageFile(path.string()), doctest::Contains("braid-test-"), Error);
+  fs::remove(path);
 }
 
 TEST_CASE("texture: what cannot be decoded is an error of one line") {

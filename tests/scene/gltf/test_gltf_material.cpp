@@ -232,6 +232,10 @@ TEST_CASE("gltf: EXT_texture_webp takes precedence over the fallback image") {
   file.root["textures"][static_cast<size_t>(texture)]["extensions"]["EXT_texture_webp"]["source"] = 1;
   giveMaterial(file, {{"normalTexture", {{"index", texture}}}});
   CHECK_ERROR(file, "missing.webp");
+  const SceneData scene = file.load();
+  CHECK(scene.materials[0].normalTexture);
+  CHECK(hasWarning(scene, "missing.webp"));
+  CHECK(hasWarning(scene, "the texture's other image is used"));
 }
 
 TEST_CASE("gltf: KHR_materials_variants") {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
+#include <string_view>
 
 #include "renderer/core/image_limits.h"
 #include "renderer/core/parallel.h"
@@ -43,10 +43,10 @@ Shown shownOfUastc(const std::vector<uint8_t>& channels) {
   }
 }
 
-Shown shownOfPlain(int channels) {
+Shown shownOfPlain(size_t channels) {
   constexpr std::array<Shown, 4> kByCount = {
       {{'r', '0', '0', '1'}, {'r', 'g', '0', '1'}, {'r', 'g', 'b', '1'}, {'r', 'g', 'b', 'a'}}};
-  return kByCount[static_cast<size_t>(channels - 1)];
+  return kByCount[channels - 1];
 }
 
 constexpr std::string_view kChannelNames = "rgba";
@@ -81,8 +81,10 @@ void arrangeRow(const T* rgba, ptrdiff_t step, size_t width, const std::vector<c
     from[c] = channel == kChannelNames.npos ? -1 : static_cast<ptrdiff_t>(channel);
     constant[c] = channels[c] == '1' ? one : T(0);
   }
-  for (size_t x = 0; x < width; ++x, rgba += step, to += count)
-    for (size_t c = 0; c < count; ++c) to[c] = isConstant && from[c] < 0 ? constant[c] : rgba[from[c]];
+  for (size_t x = 0; x < width; ++x, to += count) {
+    const T* texel = rgba + static_cast<ptrdiff_t>(x) * step;
+    for (size_t c = 0; c < count; ++c) to[c] = isConstant && from[c] < 0 ? constant[c] : texel[from[c]];
+  }
 }
 
 // From RGBA in the order of the file to the channels of the picture, upright.
@@ -102,16 +104,11 @@ std::vector<T> arranged(std::vector<T> rgba, const Container& file, const std::v
   return out;
 }
 
-template <class T>
-T dividedBy(T colour, T alpha);
-template <>
 uint8_t dividedBy(uint8_t colour, uint8_t alpha) {
   return static_cast<uint8_t>(std::min(255, (colour * 255 + alpha / 2) / alpha));
 }
-template <>
-float dividedBy(float colour, float alpha) {
-  return colour / alpha;
-}
+
+float dividedBy(float colour, float alpha) { return colour / alpha; }
 
 template <class T>
 void divideByAlpha(T* rgba, size_t texels) {
