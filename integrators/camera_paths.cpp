@@ -5,13 +5,16 @@
 
 namespace braid {
 
-Camera::CameraRay cameraRayThrough(const Plan& plan, const SampleBlock& camera, int x, int y) {
+Camera::CameraRay cameraRayThrough(const Plan& plan, const SampleBlock& camera, int x, int y, float time) {
   const PixelFilter filter = plan.settings.filter;
   Vec2 offset(camera.u[slot::kPixelX] - 0.5f, camera.u[slot::kPixelY] - 0.5f);
   if (filter != PixelFilter::Box)
     offset = {sampleFilter(filter, camera.u[slot::kPixelX]), sampleFilter(filter, camera.u[slot::kPixelY])};
-  const Vec3 lens = plan.camera.lensPoint({camera.u[slot::kLensU], camera.u[slot::kLensV]});
-  return plan.camera.rayFrom(lens, Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) + offset);
+  const CameraAt at(plan.camera, time);
+  const Vec3 lens = at->lensPoint({camera.u[slot::kLensU], camera.u[slot::kLensV]});
+  Camera::CameraRay ray = at->rayFrom(lens, Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) + offset);
+  ray.time = time;
+  return ray;
 }
 
 void surfaceFeatures(const Scene& scene, const Hit& hit, const Bsdf& bsdf, float distance, FeatureSample& features) {

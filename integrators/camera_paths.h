@@ -11,9 +11,9 @@
 
 namespace braid {
 
-// The ray of a sample of pixel (x, y) of the full frame; its place in the pixel follows the plan's filter. `camera` is
-// block 0 of the sample's random numbers.
-Camera::CameraRay cameraRayThrough(const Plan& plan, const SampleBlock& camera, int x, int y);
+// The ray of a sample of pixel (x, y) of the full frame at a time; its place in the pixel follows the plan's filter.
+// `camera` is block 0 of the sample's random numbers.
+Camera::CameraRay cameraRayThrough(const Plan& plan, const SampleBlock& camera, int x, int y, float time);
 
 // The features of a surface seen after `distance` metres: the one place that fills them, but for visibility.
 void surfaceFeatures(const Scene& scene, const Hit& hit, const Bsdf& bsdf, float distance, FeatureSample& features);

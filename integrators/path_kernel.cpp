@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "integrators/camera_paths.h"
+#include "integrators/path_time.h"
 #include "renderer/core/error.h"
 #include "renderer/transport/mis.h"
 #include "renderer/transport/shadow_ray.h"
@@ -41,9 +42,9 @@ void PathKernel::addEmission(const PathState& path, const Hit& hit, PathSample& 
   float weight = 1;
   const auto found = path.lightCouldNotBeSampled ? std::nullopt : lightAt(scene_, hit);
   if (found)
-    weight = powerHeuristic(
-        path.lastPdfW, context_.lights.pdfEmitter(path.lastPosition, path.lastNormal, path.lastTwoSided, found->light,
-                                                  glm::length(hit.position - path.lastPosition), found->cosine));
+    weight = powerHeuristic(path.lastPdfW,
+                            context_.lights.pdfEmitter(path.lastReceiver(), found->light,
+                                                       glm::length(hit.position - path.lastPosition), found->cosine));
   add(path.throughput * radiance * weight, path.bounces <= 1, sample);
 }
 
@@ -87,8 +88,8 @@ void PathKernel::recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsd
 bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided,
                              const SampleBlock& block, ShadowRay& shadow) const {
   LightSample light;
-  if (!context_.lights.sample(hit.position, receiverNormal(hit, twoSided), twoSided, block.u[slot::kLightSelect],
-                              {block.u[slot::kLightU], block.u[slot::kLightV]}, light))
+  if (!context_.lights.sample({hit.position, receiverNormal(hit, twoSided), twoSided, hit.time},
+                              block.u[slot::kLightSelect], {block.u[slot::kLightU], block.u[slot::kLightV]}, light))
     return false;
   const Vec3 wi = hit.frame.toLocal(light.wi);
   const bool reflects = glm::dot(light.wi, hit.ng) > 0;
@@ -146,10 +147,16 @@ bool PathKernel::turn(PathState& path, const Hit& hit, const Bsdf& bsdf, bool tw
   return true;
 }
 
-void PathKernel::start(int x, int y, uint64_t key) {
+void PathKernel::start(int x, int y, uint64_t key) { startAt(timeOf(x, y, key), x, y, key); }
+
+float PathKernel::timeOf(int x, int y, uint64_t key) const {
+  return scene_.moves() ? pixelTime(scene_, plan_, sampler_.block(key, 0), x, y) : 0;
+}
+
+void PathKernel::startAt(float time, int x, int y, uint64_t key) {
   BRAID_ASSERT(count_ < kBatch);
   const SampleBlock camera = sampler_.block(key, 0);
-  const Camera::CameraRay ray = cameraRayThrough(plan_, camera, x, y);
+  const Camera::CameraRay ray = cameraRayThrough(plan_, camera, x, y, time);
   const auto i = static_cast<size_t>(count_++);
   // In place: assigned, they would take the way over the stack.
   std::construct_at(&sample_[i]);
@@ -157,7 +164,8 @@ void PathKernel::start(int x, int y, uint64_t key) {
   path.key = key;
   path.origin = ray.origin;
   path.direction = ray.direction;
-  path.media = cameraMedia_;
+  path.time = time;
+  path.media = scene_.moves() ? mediaOfCamera(scene_, plan_.camera, time) : cameraMedia_;
   path.segments = 1;
 }
 
@@ -182,7 +190,7 @@ void PathKernel::queueRay(int slot, PathState& path) {
     const uint32_t salt = sampler_.salt(path.key, path.block() + static_cast<uint32_t>(path.nullCrossings));
     path.salt = (salt & ~kCameraRay) | (path.fromCamera() ? kCameraRay : 0);
   }
-  rays_.set(slot, {path.origin, path.direction, kInfinity, path.salt});
+  rays_.set(slot, {path.origin, path.direction, kInfinity, path.salt, path.time});
   if (observer_) observer_->onRay(path);
 }
 

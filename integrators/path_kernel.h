@@ -64,6 +64,8 @@ class PathKernel {
   uint64_t rayCount = 0, shadowRayCount = 0;
 
  protected:
+  float timeOf(int x, int y, uint64_t key) const;
+  void startAt(float time, int x, int y, uint64_t key);
   void queueRay(int slot, PathState& path);
   void traceActive();
   void prefetchHits() const;

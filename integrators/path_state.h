@@ -5,6 +5,7 @@
 #include "renderer/core/sampler.h"
 #include "renderer/transport/bsdf/bsdf.h"
 #include "renderer/transport/hit.h"
+#include "renderer/transport/context.h"
 #include "renderer/transport/media.h"
 
 namespace braid {
@@ -18,10 +19,12 @@ struct PathState {
   int panes = 0;          // passed straight; they are no vertices
   uint32_t salt = 0;      // of stochastic coverage, one per ray
   uint64_t key = 0;       // of the path's random numbers
+  float time = 0;
 
   // The last vertex that scattered, for the weight of light found by the direction sampled there.
   Vec3 lastPosition{0}, lastNormal{0};
   bool lastTwoSided = false;
+  Receiver lastReceiver() const { return {lastPosition, lastNormal, lastTwoSided, time}; }
   float lastPdfW = 0;
   bool lightCouldNotBeSampled = true;  // camera, delta scattering, or a null interface crossed since
 

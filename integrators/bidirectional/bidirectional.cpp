@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "integrators/camera_paths.h"
+#include "integrators/path_time.h"
 #include "integrators/tiles.h"
 
 namespace braid {
@@ -45,14 +46,15 @@ void renderTile(BidirectionalKernel& kernel, const PixelWindow& tile) {
     }
 }
 
-void LightPaths::start(SubpathBatch& batch, uint64_t item) const {
+void LightPaths::start(SubpathBatch& batch, uint64_t item, float time) const {
   const uint64_t key = sampler.itemKey(item);
   const SampleBlock u = sampler.block(key, 1);
   const double select =
       static_cast<double>(u.u[slot::kLightSelect]) + static_cast<double>(u.u[slot::kRoulette]) * 0x1p-24;
   LightStart start;
-  if (emission.sample(select, {u.u[slot::kLightU], u.u[slot::kLightV]}, {u.u[slot::kBsdfU], u.u[slot::kBsdfV]}, start))
-    batch.startLight(key, start, emission.mediaAt(start.light));
+  if (emission.sample(select, {u.u[slot::kLightU], u.u[slot::kLightV]}, {u.u[slot::kBsdfU], u.u[slot::kBsdfV]}, time,
+                      start))
+    batch.startLight(key, start, emission.mediaAt(start));
   else
     batch.startNothing();
 }
@@ -81,6 +83,7 @@ BidirectionalKernel::BidirectionalKernel(const PassRequest& request, const Bidir
       target_(target),
       observer_(observer),
       merging_(pass.merging),
+      time_(pass.time),
       mergeWeight_(merging_ ? merging_->mergeWeight : 0.0),
       light_(request.context, lights_.sampler, bidirectionalWalk(request.plan, Transport::Power, merging_)),
       eye_(request.context, eyeSampler_, bidirectionalWalk(request.plan, Transport::Radiance, merging_)),
@@ -96,24 +99,30 @@ void BidirectionalKernel::render(const std::vector<std::pair<int, int>>& pixels)
     sample_[i] = PathSample();
     featuresDone_[i] = false;
     candidates_[i] = 0;
-    lights_.start(light_, item(pixels[i]));
+    const auto& [x, y] = pixels[i];
+    const uint64_t key = eyeSampler_.itemKey(item(pixels[i]));
+    pathTime_[i] =
+        time_ || !scene_.moves() ? time_.value_or(0) : pixelTime(scene_, plan_, eyeSampler_.block(key, 0), x, y);
+    lights_.start(light_, item(pixels[i]), pathTime_[i]);
   }
   if (plan_.settings.maxDepth > 1)
     light_.run([&](int i, const SubpathState&, const SubpathVertex& v) { return storeLightVertex(i, v); },
                [](int, const SubpathState&) {});
 
-  const Camera& camera = plan_.camera;
-  for (const std::pair<int, int>& p : pixels) {
-    const uint64_t key = eyeSampler_.itemKey(item(p));
-    const SampleBlock u = eyeSampler_.block(key, 0);
-    const Camera::CameraRay ray = cameraRayThrough(plan_, u, p.first, p.second);
-    eye_.startCamera(key, ray, cameraMedia_, camera.pixelPdf(ray.direction), lights_.count, camera.orthographic());
-  }
+  for (size_t i = 0; i < pixels.size(); ++i) startEye(pixels[i].first, pixels[i].second, pathTime_[i]);
   eye_.run([&](int i, const SubpathState& s, const SubpathVertex& v) { return shadeEyeVertex(i, s, v); },
            [&](int i, const SubpathState& s) { addEnvironment(i, s); });
   queue_.flush();
   for (size_t i = 0; i < pixels.size(); ++i)
     storeSample(request_, pixels[i].first, pixels[i].second, sample_[i], target_);
+}
+
+void BidirectionalKernel::startEye(int x, int y, float time) {
+  const uint64_t key = eyeSampler_.itemKey(pixelItem(plan_, x, y));
+  const Camera::CameraRay ray = cameraRayThrough(plan_, eyeSampler_.block(key, 0), x, y, time);
+  const CameraAt camera(plan_.camera, time);
+  eye_.startCamera(key, ray, scene_.moves() ? mediaOfCamera(scene_, *camera, time) : cameraMedia_,
+                   camera->pixelPdf(ray.direction), lights_.count, camera->orthographic());
 }
 
 void BidirectionalKernel::add(int index, int s, int t, const Spectrum& value) {
@@ -180,9 +189,8 @@ void BidirectionalKernel::addEmission(int index, const SubpathState& state, cons
   double weight = 1;
   const auto found = vertex.segments > 1 ? lightAt(scene_, hit) : std::nullopt;
   if (found) {
-    const float direct =
-        context_.lights.pdfDirect(found->light, state.lastPosition, state.lastNormal, state.lastTwoSided, -hit.wo);
-    weight = hitWeight(direct, lights_.emission.pdfEmit(found->light, hit.wo, found->cosine), vertex.mis);
+    const float direct = context_.lights.pdfDirect(found->light, state.lastReceiver(), -hit.wo);
+    weight = hitWeight(direct, lights_.emission.pdfEmit(found->light, hit.wo, found->cosine, hit.time), vertex.mis);
   }
   add(index, 0, vertex.segments + 1, vertex.throughput * radiance * static_cast<float>(weight));
 }
@@ -194,7 +202,7 @@ void BidirectionalKernel::addEnvironment(int index, const SubpathState& state) {
   if (isBlack(radiance)) return;
   double weight = 1;
   if (state.segments > 1) {
-    const float emit = lights_.emission.pdfEmit(context_.lights.environmentLight(), -state.direction, 1);
+    const float emit = lights_.emission.pdfEmit(context_.lights.environmentLight(), -state.direction, 1, state.time);
     weight = hitWeight(context_.lights.pdfEnvironment(state.direction), emit, state.mis);
   }
   add(index, 0, state.segments + 1, state.throughput * radiance * static_cast<float>(weight));

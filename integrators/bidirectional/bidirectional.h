@@ -12,6 +12,7 @@
 
 #include <array>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "integrators/bidirectional/merge_grid.h"
@@ -35,7 +36,7 @@ struct LightPaths {
   double count;  // of the pass
 
   // Starts the subpath of an item on the batch.
-  void start(SubpathBatch& batch, uint64_t item) const;
+  void start(SubpathBatch& batch, uint64_t item, float time) const;
 };
 
 // Merging of eye vertices with the light vertices of a pass (vertex connection and merging).
@@ -51,6 +52,7 @@ struct BidirectionalPass {
   const PassSampler& eyeSampler;
   const MediaStack& cameraMedia;
   const Merging* merging = nullptr;
+  std::optional<float> time = std::nullopt;  // of all paths; none: each pixel has its own
 };
 
 // The walks of a plan's subpaths; merging may be null.
@@ -99,6 +101,7 @@ class BidirectionalKernel {
  private:
   Onward storeLightVertex(int index, const SubpathVertex& vertex);
   void connectToCamera(const SubpathVertex& vertex);
+  void startEye(int x, int y, float time);
   Onward shadeEyeVertex(int index, const SubpathState& state, const SubpathVertex& vertex);
   void addEmission(int index, const SubpathState& state, const SubpathVertex& vertex);
   void addEnvironment(int index, const SubpathState& state);
@@ -119,6 +122,7 @@ class BidirectionalKernel {
   PassTarget& target_;
   StrategyObserver* observer_;
   const Merging* merging_;
+  const std::optional<float> time_;
   double mergeWeight_;  // 0 without merging
   SubpathBatch light_, eye_;
   ConnectionQueue queue_;
@@ -126,6 +130,7 @@ class BidirectionalKernel {
   std::array<std::vector<SubpathVertex>, kBatch> stored_;  // light vertices that connections may use
   std::array<PathSample, kBatch> sample_;
   std::array<bool, kBatch> featuresDone_;
+  std::array<float, kBatch> pathTime_;
   std::array<float, kBatch> candidates_;  // unoccluded contributions of connections so far
 
   struct Candidate {

@@ -25,7 +25,8 @@ float hashToUnit(uint64_t key, uint32_t a, uint32_t b) {
 }  // namespace
 
 void BidirectionalKernel::connectToCamera(const SubpathVertex& vertex) {
-  const Camera& camera = plan_.camera;
+  const CameraAt cameraNow(plan_.camera, vertex.hit.time);
+  const Camera& camera = *cameraNow;
   const Vec3& position = vertex.hit.position;
   const auto segments = static_cast<uint32_t>(vertex.segments);
   // A point of the lens of its own; its density is that of camera rays, so that it leaves values and weights.
@@ -63,7 +64,7 @@ void BidirectionalKernel::connectToCamera(const SubpathVertex& vertex) {
   // From the camera, so that culled back faces let it pass as they do camera rays.
   const Vec3 end = offsetOrigin(vertex.hit, wi);
   const uint32_t salt = lights_.sampler.salt(vertex.key, 0x10000u + static_cast<uint32_t>(vertex.segments));
-  queue_.add(connectionRay(ray.origin, end, salt | kCameraRay), mediumIndex(scene_, v.media),
+  queue_.add(connectionRay(ray.origin, end, salt | kCameraRay, vertex.hit.time), mediumIndex(scene_, v.media),
              {value, vertex.segments + 1, 1, -1, static_cast<int>(raster.x), static_cast<int>(raster.y)});
 }
 
@@ -71,20 +72,21 @@ void BidirectionalKernel::sampleLight(int index, const SubpathVertex& vertex, bo
   const Hit& hit = vertex.hit;
   const SampleBlock block = eyeSampler_.block(vertex.key, vertex.block);
   LightSample light;
-  if (!context_.lights.sample(hit.position, vertex.receiverNormal(), vertex.twoSided, block.u[slot::kLightSelect],
+  if (!context_.lights.sample(vertex.receiver(), block.u[slot::kLightSelect],
                               {block.u[slot::kLightU], block.u[slot::kLightV]}, light))
     return;
   const VertexValue v = evaluateVertex(context_, vertex, Transport::Radiance, light.wi);
   if (isBlack(v.f)) return;
   float cosLight = 1, directPdf = light.pdfW;
+  EmissiveTriangle moved;
   if (light.light < context_.lights.firstPositional())
-    cosLight = std::abs(glm::dot(light.wi, scene_.emitters()[light.light].normal));
+    cosLight = std::abs(glm::dot(light.wi, scene_.emitterAt(light.light, hit.time, moved).normal));
   else if (light.light < context_.lights.firstDirectional())
     directPdf *= sqr(light.distance);
   // A surface that glows and transmits may pick a light in its own plane.
   if (!(cosLight > 0)) return;
   const double wLight = light.delta ? 0.0 : square(v.pdfW / directPdf);  // (44)
-  const float emit = lights_.emission.pdfEmit(light.light, -light.wi, cosLight);
+  const float emit = lights_.emission.pdfEmit(light.light, -light.wi, cosLight, hit.time);
   const double wCamera =  // (45)
       sqr(static_cast<double>(emit) * static_cast<double>(v.cosGeometric) /
           (static_cast<double>(directPdf) * static_cast<double>(cosLight))) *
@@ -140,7 +142,7 @@ void BidirectionalKernel::connect(int index, const SubpathVertex& eye) {
     const Vec3 end = offsetOrigin(light.hit, -c.direction);
     const uint32_t salt = eyeSampler_.salt(
         eye.key, 0x20000u + static_cast<uint32_t>(eye.segments) * 64u + static_cast<uint32_t>(c.vertex));
-    queue_.add(connectionRay(origin, end, salt & ~kCameraRay), c.index,
+    queue_.add(connectionRay(origin, end, salt & ~kCameraRay, eye.hit.time), c.index,
                {value, light.segments + 1, eye.segments + 1, index});
   }
 }

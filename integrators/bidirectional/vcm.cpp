@@ -9,6 +9,7 @@
 
 #include "integrators/bidirectional/bidirectional.h"
 #include "integrators/light_preparation.h"
+#include "integrators/path_time.h"
 #include "integrators/registry.h"
 #include "integrators/tiles.h"
 #include "renderer/core/parallel.h"
@@ -58,6 +59,7 @@ class VertexConnectionAndMerging final : public Integrator {
   const char* description() const override { return "vertex connection and merging, with shrinking radii"; }
   bool unbiased() const override { return false; }
   bool splats() const override { return true; }
+  bool passesAreInstants() const override { return true; }
   Applies applies(const SceneTraits&, const LightReach&) const override {
     return {false, "weighs all its paths into one image, which leaves combiners nothing to choose: on request only"};
   }
@@ -88,13 +90,14 @@ class VertexConnectionAndMerging final : public Integrator {
     const double eta = static_cast<double>(kPi) * sqr(static_cast<double>(radius)) * lights.count;
     Merging merging{nullptr, sqr(1 / eta), sqr(eta), static_cast<float>(1 / eta)};
 
+    const float time = passTime(request.context.scene, eyeSampler);
     std::vector<MergeVertex> vertices;
-    if (!traceLightPaths(request, lights, merging, vertices)) return false;
+    if (!traceLightPaths(request, lights, merging, time, vertices)) return false;
     const MergeGrid grid(std::move(vertices), radius);
     merging.grid = &grid;
-    const MediaStack cameraMedia = mediaOfCamera(request.context.scene, plan.camera);
+    const MediaStack cameraMedia = mediaOfCamera(request.context.scene, plan.camera, time);
     return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>*) {
-      BidirectionalKernel kernel(request, {lights, eyeSampler, cameraMedia, &merging}, target);
+      BidirectionalKernel kernel(request, {lights, eyeSampler, cameraMedia, &merging, time}, target);
       renderTile(kernel, tile);
       return TileCounts{pixelCount(tile), kernel.rayCount(), kernel.shadowRayCount()};
     });
@@ -102,7 +105,7 @@ class VertexConnectionAndMerging final : public Integrator {
 
  private:
   // The light vertices of the pass in the order of their subpaths; false when cancelled.
-  static bool traceLightPaths(const PassRequest& request, const LightPaths& lights, const Merging& merging,
+  static bool traceLightPaths(const PassRequest& request, const LightPaths& lights, const Merging& merging, float time,
                               std::vector<MergeVertex>& vertices) {
     const PixelWindow& w = request.plan.window;
     const auto width = static_cast<size_t>(w.width()), count = width * static_cast<size_t>(w.height());
@@ -117,7 +120,8 @@ class VertexConnectionAndMerging final : public Integrator {
         batch.clear();
         for (size_t i = first; i < std::min(end, first + kBatch); ++i)
           lights.start(batch,
-                       pixelItem(request.plan, w.x0 + static_cast<int>(i % width), w.y0 + static_cast<int>(i / width)));
+                       pixelItem(request.plan, w.x0 + static_cast<int>(i % width), w.y0 + static_cast<int>(i / width)),
+                       time);
         batch.run(
             [&](int, const SubpathState&, const SubpathVertex& v) {
               if (!v.woBelow && v.bsdf.hasNonDelta())

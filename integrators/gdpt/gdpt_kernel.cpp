@@ -45,9 +45,10 @@ GradientKernel::GradientKernel(const TransportContext& context, const Plan& plan
 
 void GradientKernel::start(int x, int y, uint64_t key) {
   BRAID_ASSERT(lanes_.size() < static_cast<size_t>(kBatch));
+  const float time = timeOf(x, y, key);
   const auto camera = [&](int px, int py) {
     count_ = 0;
-    PathKernel::start(px, py, key);
+    startAt(time, px, py, key);
     return path_[0];
   };
   BasePath& base = lanes_.emplace_back();

@@ -153,6 +153,7 @@ bool GradientKernel::connect(const BasePath& base, ShiftedPath& shift, const Bsd
   ray.direction = offsetOrigin(target, -direction) - ray.origin;
   ray.tmax = kConnectionLength;
   ray.salt = base.walker.path.salt;
+  ray.time = base.walker.path.time;
 
   w.path.direction = direction;
   w.path.lastPosition = w.hit.position;

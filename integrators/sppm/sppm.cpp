@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "integrators/light_preparation.h"
+#include "integrators/path_time.h"
 #include "integrators/registry.h"
 #include "integrators/sppm/sppm_eye.h"
 #include "integrators/sppm/sppm_gather.h"
@@ -25,6 +26,7 @@ class PhotonMapper final : public Integrator {
   }
   bool unbiased() const override { return false; }
   bool estimatesBias() const override { return true; }
+  bool passesAreInstants() const override { return true; }
   Applies applies(const SceneTraits& traits, const LightReach& reach) const override {
     return photonsApply(traits, reach);
   }
@@ -53,22 +55,23 @@ bool PhotonMapper::renderPass(const PassRequest& request, PassTarget& target) co
   const PassSampler lightSampler(plan.settings.sampler, plan.settings.seed, kLightStream, request.pass);
   const PassSampler eyeSampler(plan.settings.sampler, plan.settings.seed, kEyeStream, request.pass);
   const uint64_t paths = photonPaths(plan);
+  const float time = passTime(request.context.scene, eyeSampler);
   TracedPhotons traced;
   if (plan.settings.maxDepth > 1 && !preparation->emission().empty() &&
-      !tracePhotons(request.context, {preparation->emission(), lightSampler, paths}, plan.settings, preparation->keep(),
-                    request.cancel, traced))
+      !tracePhotons(request.context, {preparation->emission(), lightSampler, paths, time}, plan.settings,
+                    preparation->keep(), request.cancel, traced))
     return false;
   if (request.statistics) request.statistics->rays += traced.segments;
-  const RadiusScale radii = gatherRadii(plan, request.context.scene.traits(), request.pass);
+  const RadiusScale radii = gatherRadii(plan, request.context.scene.traits(), request.pass, time);
   const PhotonGrid grid(std::move(traced.photons), radii);
   const CausticGrid causticGrid(std::move(traced.caustics), radii);
   const auto lightPaths = static_cast<double>(paths);
   const CausticMerging caustics{causticGrid, preparation->emission(), lightPaths, preparation->keep()};
   const bool merges = mergesCaustics(request.context.scene, plan.settings.maxDepth);
-  const MediaStack cameraMedia = mediaOfCamera(request.context.scene, plan.camera);
+  const MediaStack cameraMedia = mediaOfCamera(request.context.scene, plan.camera, time);
 
   return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>*) {
-    PhotonEyeBatch batch(request.context, plan, eyeSampler, cameraMedia, merges ? &caustics : nullptr);
+    PhotonEyeBatch batch(request.context, plan, eyeSampler, cameraMedia, merges ? &caustics : nullptr, time);
     forEachBatch(
         tile,
         [&](int i, int x, int y) {

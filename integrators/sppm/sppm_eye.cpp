@@ -24,13 +24,14 @@ WalkSettings eyeSettings(const Plan& plan, bool merges) {
 }  // namespace
 
 PhotonEyeBatch::PhotonEyeBatch(const TransportContext& context, const Plan& plan, const PassSampler& sampler,
-                               const MediaStack& cameraMedia, const CausticMerging* caustics)
+                               const MediaStack& cameraMedia, const CausticMerging* caustics, float time)
     : context_(context),
       scene_(context.scene),
       plan_(plan),
       sampler_(sampler),
       cameraMedia_(cameraMedia),
       caustics_(caustics),
+      time_(time),
       lightsCanBeHit_(!context.scene.emitters().empty() || context.scene.environment()),
       walks_(context, sampler, eyeSettings(plan, caustics)),
       shadowRays_(context) {}
@@ -43,7 +44,7 @@ void PhotonEyeBatch::clear() {
 void PhotonEyeBatch::start(int x, int y, uint64_t key) {
   BRAID_ASSERT(count_ < kBatch);
   const SampleBlock camera = sampler_.block(key, 0);
-  const Camera::CameraRay ray = cameraRayThrough(plan_, camera, x, y);
+  const Camera::CameraRay ray = cameraRayThrough(plan_, camera, x, y, time_);
   path_[static_cast<size_t>(count_)] = Path();
   sample_[static_cast<size_t>(count_)] = PathSample();
   bias_[static_cast<size_t>(count_)] = Spectrum(0);
@@ -115,7 +116,7 @@ float PhotonEyeBatch::causticHitWeight(int index, const SubpathState& state, uin
                                        float cosLight) const {
   const double merged2 = path_[static_cast<size_t>(index)].merged2;
   if (state.deltaRun == 0 || !(merged2 > 0)) return 1;
-  const float emit = caustics_->emission.pdfEmit(light, direction, cosLight);
+  const float emit = caustics_->emission.pdfEmit(light, direction, cosLight, time_);
   if (!(emit > 0)) return 1;
   return static_cast<float>(1 / (1 + sqr(static_cast<double>(emit)) * state.chain * merged2));
 }
@@ -138,10 +139,10 @@ void PhotonEyeBatch::addEmission(int index, const SubpathState& state, const Sub
     if (state.lightCouldNotBeSampled)
       weight = causticHitWeight(index, state, found->light, hit.wo, found->cosine);
     else
-      weight = powerHeuristic(
-          path_[static_cast<size_t>(index)].choice * state.lastPdfW,
-          context_.lights.pdfEmitter(state.lastPosition, state.lastNormal, state.lastTwoSided, found->light,
-                                     glm::length(hit.position - state.lastPosition), found->cosine));
+      weight =
+          powerHeuristic(path_[static_cast<size_t>(index)].choice * state.lastPdfW,
+                         context_.lights.pdfEmitter(state.lastReceiver(), found->light,
+                                                    glm::length(hit.position - state.lastPosition), found->cosine));
   }
   sample_[static_cast<size_t>(index)].radiance += vertex.throughput * radiance * weight;
 }
@@ -165,7 +166,7 @@ void PhotonEyeBatch::sampleLight(int index, const SubpathVertex& vertex, const L
                                  bool forFeatures) {
   const Hit& hit = vertex.hit;
   LightSample light;
-  if (!context_.lights.sample(hit.position, vertex.receiverNormal(), vertex.twoSided, block.u[slot::kLightSelect],
+  if (!context_.lights.sample(vertex.receiver(), block.u[slot::kLightSelect],
                               {block.u[slot::kLightU], block.u[slot::kLightV]}, light))
     return;
   const Vec3 wi = hit.frame.toLocal(light.wi);

@@ -15,9 +15,10 @@ namespace braid {
 
 class PhotonEyeBatch {
  public:
-  // `caustics` may be null: the light that they bring is left to hitting lights then.
+  // All paths have one time, and the camera is in these media then. `caustics` may be null: the light that they bring
+  // is left to hitting lights then.
   PhotonEyeBatch(const TransportContext& context, const Plan& plan, const PassSampler& sampler,
-                 const MediaStack& cameraMedia, const CausticMerging* caustics = nullptr);
+                 const MediaStack& cameraMedia, const CausticMerging* caustics = nullptr, float time = 0);
 
   // Starts a path through pixel (x, y) of the full frame; at most kBatch before a run().
   void start(int x, int y, uint64_t key);
@@ -91,6 +92,7 @@ class PhotonEyeBatch {
   const PassSampler& sampler_;
   const MediaStack& cameraMedia_;
   const CausticMerging* caustics_;
+  const float time_;  // of all paths
   bool lightsCanBeHit_;
   SubpathBatch walks_;
   int count_ = 0;

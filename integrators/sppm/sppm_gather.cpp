@@ -42,10 +42,10 @@ float radiusShrinkage(uint64_t pass) {
   return static_cast<float>(std::pow(static_cast<double>(pass / 4 + 1), -0.5 * (1 - kAlpha)));
 }
 
-RadiusScale gatherRadii(const Plan& plan, const SceneTraits& traits, uint64_t pass) {
+RadiusScale gatherRadii(const Plan& plan, const SceneTraits& traits, uint64_t pass, float time) {
   const float shrink = radiusShrinkage(pass);
   RadiusScale s;
-  s.camera = plan.camera.position();
+  s.camera = CameraAt(plan.camera, time)->position();
   s.perspective = !plan.camera.orthographic();
   const double pixel = 1 / std::sqrt(plan.camera.pixelPdf(plan.camera.forward()));
   s.smallest = std::max(kSmallest * traits.radius, 1e-30f);

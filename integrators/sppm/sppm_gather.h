@@ -16,7 +16,7 @@ float radiusShrinkage(uint64_t pass);
 
 // Gather radii of a pass: Settings::photonRadius pixels as seen over the path from the camera, between 1e-7 and 0.05 of
 // the scene's radius, times radiusShrinkage().
-RadiusScale gatherRadii(const Plan& plan, const SceneTraits& traits, uint64_t pass);
+RadiusScale gatherRadii(const Plan& plan, const SceneTraits& traits, uint64_t pass, float time = 0);
 
 // The share of the disc's area that lies in its inner disc: smaller ones estimate more of the bias at edges of light,
 // but are noisier (integrators/README.md, Bias of photon maps).

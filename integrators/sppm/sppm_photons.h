@@ -17,6 +17,7 @@ struct PhotonEmission {
   const LightEmission& emission;
   const PassSampler& sampler;
   uint64_t paths;  // in all: the choice of the light is stratified over them
+  float time = 0;  // of all of them
 };
 
 // Light subpaths of a pass: as asked for, or one per pixel of the window, of which a small window gets a few more.
@@ -52,8 +53,8 @@ uint64_t followLightPaths(const TransportContext& context, const PhotonEmission&
           (static_cast<double>(item) + static_cast<double>(u.u[slot::kLightSelect])) / static_cast<double>(light.paths);
       LightStart start;
       if (light.emission.sample(select, {u.u[slot::kLightU], u.u[slot::kLightV]},
-                                {u.u[slot::kBsdfU], u.u[slot::kBsdfV]}, start))
-        batch.startLight(key, start, light.emission.mediaAt(start.light));
+                                {u.u[slot::kBsdfU], u.u[slot::kBsdfV]}, light.time, start))
+        batch.startLight(key, start, light.emission.mediaAt(start));
       else
         batch.startNothing();
     }

@@ -29,15 +29,22 @@ struct LightRecord {
   uint32_t paths = 0, useful = 0;
 };
 
+// Rows of pixels and groups of light paths each have a time of their own: multiples of the golden ratio.
+float pilotTime(const Scene& scene, size_t i) {
+  const double share = 0.6180339887498949 * static_cast<double>(i);
+  return scene.timeAt(static_cast<float>(share - std::floor(share)));
+}
+
 // Points that the camera sees, directly or through narrow lobes, on a grid of pixels; as photons, to be searched.
 std::vector<Photon> visiblePoints(const TransportContext& context, const Plan& plan, int stride) {
   const PixelWindow& w = plan.window;
   const int columns = (w.width() + stride - 1) / stride, rows = (w.height() + stride - 1) / stride;
   const PassSampler sampler(SamplerKind::Independent, plan.settings.seed, kEyeStream, 0);
-  const MediaStack media = mediaOfCamera(context.scene, plan.camera);
   std::vector<std::vector<Photon>> rowPoints(static_cast<size_t>(rows));
   parallelRows(rows, [&](int row) {
-    PhotonEyeBatch batch(context, plan, sampler, media);
+    const float time = pilotTime(context.scene, static_cast<size_t>(row));
+    const MediaStack media = mediaOfCamera(context.scene, plan.camera, time);
+    PhotonEyeBatch batch(context, plan, sampler, media, nullptr, time);
     for (int first = 0; first < columns; first += kBatch) {
       batch.clear();
       for (int column = first; column < std::min(columns, first + kBatch); ++column)
@@ -128,7 +135,9 @@ Pilot runPilot(const TransportContext& context, const Plan& plan, const LightEmi
     std::array<uint64_t, kBatch> counted;  // by walk of the batch: the last path that was counted as useful
     counted.fill(kNever);
     uint64_t storedHere = 0;
-    followLightPaths(context, light, plan.settings.maxDepth, begin, end,
+    PhotonEmission chunk = light;
+    chunk.time = pilotTime(context.scene, begin / kChunk);
+    followLightPaths(context, chunk, plan.settings.maxDepth, begin, end,
                      [&](uint64_t item, const SubpathState& state, const SubpathVertex& v) {
                        LightRecord& record = records[state.light];
                        if (v.segments == 1 && !state.throughPane) std::atomic_ref<uint32_t>(record.paths).fetch_add(1);

@@ -31,7 +31,7 @@ RTCRay singleRay(const RayQuery& r) {
   ray.dir_x = r.direction.x;
   ray.dir_y = r.direction.y;
   ray.dir_z = r.direction.z;
-  ray.time = 0;
+  ray.time = r.time;
   ray.tfar = r.tmax;
   ray.mask = ~0u;
   ray.id = r.salt;
@@ -114,8 +114,10 @@ void Accel::attachMesh(RTCScene scene, uint32_t meshIndex, const AccelInput& inp
   const TriangleMesh& mesh = (*input.meshes)[meshIndex];
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
   rtcSetGeometryBuildQuality(geometry, highQuality_ ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.positions.data(), 0,
-                             sizeof(Vec3), mesh.positions.size());
+  if (mesh.moves()) rtcSetGeometryTimeStepCount(geometry, static_cast<unsigned>(mesh.steps.size() + 1));
+  for (unsigned k = 0; k <= mesh.steps.size(); ++k)
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, k, RTC_FORMAT_FLOAT3, mesh.step(k).positions.data(), 0,
+                               sizeof(Vec3), mesh.positions.size());
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
                              sizeof(glm::uvec3), mesh.triangles.size());
   if (filter_ && (*input.filtered)[meshIndex]) {
@@ -158,7 +160,14 @@ void Accel::build(const AccelInput& input, const HitFilter* filter) {
   for (const GroupInstance& instance : *input.instances) {
     RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
     rtcSetGeometryInstancedScene(geometry, groupScenes_[instance.group]);
-    rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, &instance.toWorld[0][0]);
+    if (instance.motion == GroupInstance::kStill) {
+      rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, &instance.toWorld[0][0]);
+    } else {
+      const std::vector<Mat4>& steps = (*input.motions)[instance.motion];
+      rtcSetGeometryTimeStepCount(geometry, static_cast<unsigned>(steps.size()));
+      for (unsigned k = 0; k < steps.size(); ++k)
+        rtcSetGeometryTransform(geometry, k, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, &steps[k][0][0]);
+    }
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene_, geometry);
     rtcReleaseGeometry(geometry);
@@ -203,6 +212,7 @@ void Accel::intersect(RayBatch& rays, int count, RayHit* hits) const {
       hit.u = query.hit.u[i];
       hit.v = query.hit.v[i];
       hit.triangle = query.hit.primID[i];
+      hit.time = query.ray.time[i];
       resolve(query.hit.geomID[i], query.hit.instID[0][i], hit);
       if (coincident_)
         preferFacing(rays.get(first + i), {query.hit.Ng_x[i], query.hit.Ng_y[i], query.hit.Ng_z[i]}, hit);
@@ -221,6 +231,7 @@ void Accel::intersectSingle(const RayQuery& ray, RayHit& hit) const {
   hit.u = query.hit.u;
   hit.v = query.hit.v;
   hit.triangle = query.hit.primID;
+  hit.time = ray.time;
   resolve(query.hit.geomID, query.hit.instID[0], hit);
   if (coincident_) preferFacing(ray, {query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z}, hit);
 }
@@ -253,7 +264,7 @@ void Accel::preferFacing(const RayQuery& ray, const Vec3& ng, RayHit& hit) const
   embreeIntersect1(coincidentScene_, query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
   const CoincidentFaces::Face& face = coincident_->faces()[query.hit.primID];
-  const RayHit found{query.ray.tfar, query.hit.u, query.hit.v, face.mesh, face.triangle, face.instance};
+  const RayHit found{query.ray.tfar, query.hit.u, query.hit.v, face.mesh, face.triangle, face.instance, hit.time};
   if (coincident_->pairs(hit, found)) hit = found;
 }
 

@@ -32,6 +32,7 @@ struct RayQuery {
   Vec3 origin, direction;
   float tmax = kInfinity;
   uint32_t salt = 0;
+  float time = 0;  // while the shutter is open (motion.h)
 };
 
 struct RayHit {
@@ -41,6 +42,7 @@ struct RayHit {
   uint32_t triangle = 0;
   uint32_t instance =
       kNoInstance;  // index into the scene's instances, or kNoInstance when the mesh lies in world space
+  float time = 0;   // of the ray
 };
 
 // Rays are traced in packets of kPacket: also for unrelated rays that is faster than one at a time (0.74x the time in a
@@ -65,7 +67,7 @@ class PacketBatch {
     q.dir_x[lane] = r.direction.x;
     q.dir_y[lane] = r.direction.y;
     q.dir_z[lane] = r.direction.z;
-    q.time[lane] = 0;
+    q.time[lane] = r.time;
     q.tfar[lane] = r.tmax;
     q.mask[lane] = ~0u;
     q.id[lane] = r.salt;  // handed back to the filter
@@ -74,7 +76,7 @@ class PacketBatch {
   RayQuery get(int i) const {
     const RTCRay8& q = ray(const_cast<Packet&>(packets_[static_cast<size_t>(i / kPacket)]));
     const int l = i % kPacket;
-    return {{q.org_x[l], q.org_y[l], q.org_z[l]}, {q.dir_x[l], q.dir_y[l], q.dir_z[l]}, q.tfar[l], q.id[l]};
+    return {{q.org_x[l], q.org_y[l], q.org_z[l]}, {q.dir_x[l], q.dir_y[l], q.dir_z[l]}, q.tfar[l], q.id[l], q.time[l]};
   }
   Packet& packet(int first) { return packets_[static_cast<size_t>(first / kPacket)]; }
 
@@ -91,7 +93,9 @@ struct MeshGroup {
   std::vector<uint32_t> meshes;
 };
 struct GroupInstance {
+  static constexpr uint32_t kStill = ~0u;
   uint32_t group = 0;
+  uint32_t motion = kStill;  // index into a list of transforms at the steps 0, 1, … of the scene's motion
   Mat4 toWorld{1};
   Mat4 toObject{1};
 };
@@ -104,8 +108,9 @@ struct AccelInput {
   const std::vector<uint32_t>* worldMeshes = nullptr;
   const std::vector<MeshGroup>* groups = nullptr;
   const std::vector<GroupInstance>* instances = nullptr;
-  std::string isa;          // e.g. "avx2"; empty: Embree's choice
-  bool highQuality = true;  // spatial splits
+  const std::vector<std::vector<Mat4>>* motions = nullptr;  // that instances refer to
+  std::string isa;                                          // e.g. "avx2"; empty: Embree's choice
+  bool highQuality = true;                                  // spatial splits
   const CoincidentFaces* coincident = nullptr;
 };
 

@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/scene/camera.h"
 
+#include "renderer/scene/data/motion.h"
+
 namespace braid {
 
 Camera::Camera(const CameraData& data, int width, int height)
     : width_(static_cast<float>(width)), height_(static_cast<float>(height)), orthographic_(data.orthographic) {
-  const Mat3 rotation(data.toWorld);
-  position_ = Vec3(data.toWorld[3]);
-  right_ = glm::normalize(rotation[0]);
-  up_ = glm::normalize(rotation[1]);
-  forward_ = -glm::normalize(rotation[2]);
+  const Axes axes = axesOf(data.toWorld);
+  position_ = axes.position;
+  right_ = axes.right;
+  up_ = axes.up;
+  forward_ = axes.forward;
+  if (!data.steps.empty()) steps_.push_back(axes);
+  for (const Mat4& step : data.steps) steps_.push_back(axesOf(step));
   const float frameAspect = width_ / height_;
   halfHeight_ = orthographic_ ? data.ymag : std::tan(0.5f * data.yfov);
   halfWidth_ = halfHeight_ * frameAspect;
@@ -17,6 +21,33 @@ Camera::Camera(const CameraData& data, int width, int height)
     lensRadius_ = data.lensRadius;
     focusDistance_ = data.focusDistance;
   }
+}
+
+Camera::Axes Camera::axesOf(const Mat4& toWorld) {
+  const Mat3 rotation(toWorld);
+  return {Vec3(toWorld[3]), glm::normalize(rotation[0]), glm::normalize(rotation[1]), -glm::normalize(rotation[2])};
+}
+
+// The directions in between are made orthogonal again, the view's first.
+Camera Camera::at(float time) const {
+  const Moment m = momentAt(time, steps_.size() - 1);
+  const Axes &a = steps_[m.first], &b = steps_[m.first + 1];
+  const Vec3 forward = between(a.forward, b.forward, m.fraction), right = between(a.right, b.right, m.fraction);
+  Camera c;
+  c.halfWidth_ = halfWidth_;
+  c.halfHeight_ = halfHeight_;
+  c.width_ = width_;
+  c.height_ = height_;
+  c.lensRadius_ = lensRadius_;
+  c.focusDistance_ = focusDistance_;
+  c.orthographic_ = orthographic_;
+  c.position_ = between(a.position, b.position, m.fraction);
+  const Vec3 up = glm::cross(right, forward);
+  const bool defined = glm::length(forward) > 1e-3f && glm::length(up) > 1e-3f * glm::length(forward);
+  c.forward_ = defined ? glm::normalize(forward) : a.forward;
+  c.up_ = defined ? glm::normalize(up) : a.up;
+  c.right_ = glm::cross(c.forward_, c.up_);
+  return c;
 }
 
 Camera::CameraRay Camera::rayFrom(const Vec3& lensPoint, Vec2 raster) const {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "renderer/core/vec.h"
 #include "renderer/scene/data/scene_data.h"
@@ -19,6 +20,7 @@ class Camera {
 
   struct CameraRay {
     Vec3 origin, direction;  // direction is unit
+    float time = 0;          // of its path
   };
   // Ray through the raster position (pixel centres at +0.5): of a pinhole, or through the centre of the lens.
   CameraRay ray(Vec2 raster) const { return rayFrom(position_, raster); }
@@ -37,6 +39,10 @@ class Camera {
   // as all see the same frame on the plane of focus.
   double pixelPdf(const Vec3& d) const;
 
+  // Whether it moves while the shutter is open. All else here is what it is at the opening, or at the time of at().
+  bool moves() const { return !steps_.empty(); }
+  Camera at(float time) const;
+
   float lensRadius() const { return lensRadius_; }  // metres; 0: pinhole
   float focusDistance() const { return focusDistance_; }
   bool orthographic() const { return orthographic_; }
@@ -49,11 +55,31 @@ class Camera {
   Mat4 worldToNdc(const glm::dvec3& origin = glm::dvec3(0)) const;
 
  private:
+  struct Axes {
+    Vec3 position{0}, right{1, 0, 0}, up{0, 1, 0}, forward{0, 0, -1};
+  };
+  static Axes axesOf(const Mat4& toWorld);
+
   Vec3 position_{0}, right_{1, 0, 0}, up_{0, 1, 0}, forward_{0, 0, -1};
   float halfWidth_ = 1, halfHeight_ = 1;  // of the frame at distance 1, or of the sensor
   float width_ = 1, height_ = 1;
   float lensRadius_ = 0, focusDistance_ = 1;
   bool orthographic_ = false;
+  std::vector<Axes> steps_;  // 0, 1, … of the scene's motion; empty: it stands still
+};
+
+// A camera at a time, without a copy of one that stands still.
+class CameraAt {
+ public:
+  CameraAt(const Camera& camera, float time) : still_(camera) {
+    if (camera.moves()) moved_ = camera.at(time);
+  }
+  const Camera& operator*() const { return moved_ ? *moved_ : still_; }
+  const Camera* operator->() const { return &**this; }
+
+ private:
+  const Camera& still_;
+  std::optional<Camera> moved_;
 };
 
 }  // namespace braid

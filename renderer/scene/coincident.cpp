@@ -141,9 +141,11 @@ CoincidentFaces::CoincidentFaces(const AccelInput& input, const std::vector<uint
   for (const GroupInstance& i : instances_)
     for (const uint32_t m : (*input.groups)[i.group].meshes) repeated += meshes_[m].triangles.size();
   std::vector<Placed> world;
-  for (const uint32_t m : *input.worldMeshes) world.push_back({m, kNoInstance});
+  for (const uint32_t m : *input.worldMeshes)
+    if (!meshes_[m].moves()) world.push_back({m, kNoInstance});
   for (uint32_t i = 0; repeated <= kMostPlaced && i < instances_.size(); ++i)
-    for (const uint32_t m : (*input.groups)[instances_[i].group].meshes) world.push_back({m, i});
+    for (const uint32_t m : (*input.groups)[instances_[i].group].meshes)
+      if (instances_[i].motion == GroupInstance::kStill && !meshes_[m].moves()) world.push_back({m, i});
   look(world);
 }
 
@@ -273,6 +275,7 @@ CoincidentFaces::Triangle CoincidentFaces::triangleOf(uint32_t meshIndex, uint32
 float CoincidentFaces::reach(const RayQuery& ray, const RayHit& hit) const {
   const std::vector<bool>& suspect = suspect_[hit.mesh];
   if (suspect.empty() || !suspect[hit.triangle]) return 0;
+  if (hit.instance != kNoInstance && instances_[hit.instance].motion != GroupInstance::kStill) return 0;
   const Triangle triangle = triangleOf(hit);
   const double away = glm::dot(glm::dvec3(ray.direction), normalOf(triangle.p, triangle.mirrored));
   if (!(away > 0)) return 0;

@@ -14,7 +14,8 @@ class CoincidentFaces {
  public:
   // Looks for opaque triangles of which another one, facing the other way, lies in the same plane, in linear time.
   // `reachable`, per mesh: whether rays may meet its back faces; `opaque`: whether no light passes its surface.
-  // Repeated meshes are compared up to kMostPlaced triangles in all; beyond that they are left out.
+  // Repeated meshes are compared up to kMostPlaced triangles in all; beyond that they are left out, as is what moves
+  // while the shutter is open.
   CoincidentFaces(const AccelInput& input, const std::vector<uint8_t>& reachable, const std::vector<uint8_t>& opaque);
   static constexpr uint64_t kMostPlaced = uint64_t(1) << 18;
 

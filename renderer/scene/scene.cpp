@@ -16,7 +16,10 @@ namespace braid {
 
 Scene::Scene(SceneData data, const SceneOptions& options) : data_(std::move(data)) {
   const Stopwatch preparing;
-  for (const TriangleMesh& mesh : data_.meshes) BRAID_ASSERT(mesh.material < data_.materials.size());
+  for (const TriangleMesh& mesh : data_.meshes) {
+    BRAID_ASSERT(mesh.material < data_.materials.size());
+    BRAID_ASSERT(!mesh.moves() || mesh.steps.size() + 1 == data_.motion.times.size());
+  }
   if (data_.environment) environment_.emplace(*data_.environment);
   placeMeshes();
   markFilteredMeshes(options.full);
@@ -31,6 +34,7 @@ Scene::Scene(SceneData data, const SceneOptions& options) : data_(std::move(data
   input.worldMeshes = &worldMeshes_;
   input.groups = &groups_;
   input.instances = &instances_;
+  input.motions = &motions_;
   input.isa = options.isa;
   input.highQuality = options.highQuality.value_or(traits_.triangles <= 4'000'000);
   coincident_.emplace(input, reachableBacks_, opaque_);
@@ -47,13 +51,34 @@ void Scene::addDefaultLight(DefaultLight kind, float scale, const std::string& w
   traits_.flags |= environment_->constant() ? kTraitEnvironment : kTraitEnvironment | kTraitEnvironmentImage;
 }
 
-// A mesh that one of several placements flattens cannot be an instance there, because rays could not be brought into
-// its coordinates: it gets a copy of its own.
-void Scene::separateFlattened() {
+namespace {
+
+// At all times.
+bool isSolid(const MeshInstance& instance) {
+  const auto solid = [](const Mat4& m) { return shapeOf(glm::dmat4(m)) == Shape::Solid; };
+  return solid(instance.toWorld) && std::all_of(instance.steps.begin(), instance.steps.end(), solid);
+}
+
+uint64_t placementKey(const std::vector<MeshInstance>& instances, const std::vector<size_t>& placements) {
+  ContentHash hash;
+  for (const size_t i : placements) {
+    hash.add(&instances[i].toWorld, sizeof(Mat4));
+    for (const Mat4& step : instances[i].steps) hash.add(&step, sizeof(Mat4));
+  }
+  return hash.value();
+}
+
+}  // namespace
+
+// A mesh that one of several placements flattens, at any time, cannot be an instance there, because rays could not be
+// brought into its coordinates; one that changes its shape in a place that moves would not move on straight lines: each
+// gets a copy of its own.
+void Scene::separateUnfit() {
   std::vector<uint32_t> count(data_.meshes.size(), 0);
   for (const MeshInstance& i : data_.instances) ++count[i.mesh];
   for (MeshInstance& i : data_.instances) {
-    if (count[i.mesh] == 1 || shapeOf(glm::dmat4(i.toWorld)) == Shape::Solid) continue;
+    const bool straight = i.steps.empty() || !data_.meshes[i.mesh].moves();
+    if (count[i.mesh] == 1 || (straight && isSolid(i))) continue;
     --count[i.mesh];
     TriangleMesh copy = data_.meshes[i.mesh];
     i.mesh = static_cast<uint32_t>(data_.meshes.size());
@@ -62,29 +87,36 @@ void Scene::separateFlattened() {
 }
 
 // Meshes placed once are baked into world space, which spares every ray the instance transform; meshes placed several
-// times keep one copy. Meshes with the same list of placements form a group, so that a tree's trunk and leaves are one
-// instance.
+// times, or moved as they are, keep one copy.
 void Scene::placeMeshes() {
-  separateFlattened();
+  separateUnfit();
   std::vector<std::vector<size_t>> placements(data_.meshes.size());
   for (size_t i = 0; i < data_.instances.size(); ++i) placements[data_.instances[i].mesh].push_back(i);
-
-  std::map<uint64_t, std::vector<uint32_t>> byPlacement;
-  std::vector<uint64_t> order;
+  std::vector<uint32_t> shared;
   for (uint32_t m = 0; m < data_.meshes.size(); ++m) {
     TriangleMesh& mesh = data_.meshes[m];
     if (placements[m].empty() || mesh.triangles.empty()) continue;
-    if (placements[m].size() == 1) {
-      transformMesh(mesh, data_.instances[placements[m][0]].toWorld);
-      mesh.padForEmbree();
+    const MeshInstance& instance = data_.instances[placements[m][0]];
+    if (placements[m].size() > 1 || (!instance.steps.empty() && !mesh.moves() && isSolid(instance))) {
+      shared.push_back(m);
+    } else {
+      transformMesh(mesh, instance.toWorld, instance.steps);
       worldMeshes_.push_back(m);
-      continue;
     }
     mesh.padForEmbree();
-    ContentHash hash;
-    for (size_t i : placements[m]) hash.add(&data_.instances[i].toWorld, sizeof(Mat4));
-    auto [entry, isNew] = byPlacement.try_emplace(hash.value());
-    if (isNew) order.push_back(hash.value());
+  }
+  placeGroups(shared, placements);
+  findBounds();
+}
+
+// Meshes with the same list of placements form a group, so that a tree's trunk and leaves are one instance.
+void Scene::placeGroups(const std::vector<uint32_t>& shared, const std::vector<std::vector<size_t>>& placements) {
+  std::map<uint64_t, std::vector<uint32_t>> byPlacement;
+  std::vector<uint64_t> order;
+  for (const uint32_t m : shared) {
+    const uint64_t key = placementKey(data_.instances, placements[m]);
+    auto [entry, isNew] = byPlacement.try_emplace(key);
+    if (isNew) order.push_back(key);
     entry->second.push_back(m);
   }
   for (uint64_t key : order) {
@@ -92,24 +124,41 @@ void Scene::placeMeshes() {
     const auto group = static_cast<uint32_t>(groups_.size());
     groups_.push_back({meshes});
     for (size_t i : placements[meshes[0]]) {
+      const MeshInstance& source = data_.instances[i];
       GroupInstance instance;
       instance.group = group;
-      instance.toWorld = data_.instances[i].toWorld;
+      instance.toWorld = source.toWorld;
       instance.toObject = glm::inverse(instance.toWorld);
+      if (!source.steps.empty()) {
+        instance.motion = static_cast<uint32_t>(motions_.size());
+        motions_.push_back({source.toWorld});
+        motions_.back().insert(motions_.back().end(), source.steps.begin(), source.steps.end());
+      }
       instances_.push_back(instance);
     }
   }
-  for (uint32_t m : worldMeshes_)
-    for (const Vec3& p : data_.meshes[m].positions) bounds_.extend(p);
+}
+
+// Of all that is there at any time.
+void Scene::findBounds() {
+  const auto extend = [&](Bounds& bounds, uint32_t m) {
+    for (size_t k = 0; k <= data_.meshes[m].steps.size(); ++k)
+      for (const Vec3& p : data_.meshes[m].step(k).positions) bounds.extend(p);
+  };
+  for (uint32_t m : worldMeshes_) extend(bounds_, m);
   std::vector<Bounds> groupBounds(groups_.size());
   for (size_t g = 0; g < groups_.size(); ++g)
-    for (uint32_t m : groups_[g].meshes)
-      for (const Vec3& p : data_.meshes[m].positions) groupBounds[g].extend(p);
+    for (uint32_t m : groups_[g].meshes) extend(groupBounds[g], m);
   for (const GroupInstance& instance : instances_) {
     const Bounds& b = groupBounds[instance.group];
-    for (int corner = 0; corner < 8; ++corner)
-      bounds_.extend(Vec3(instance.toWorld * Vec4(corner & 1 ? b.hi.x : b.lo.x, corner & 2 ? b.hi.y : b.lo.y,
-                                                  corner & 4 ? b.hi.z : b.lo.z, 1)));
+    const auto place = [&](const Mat4& toWorld) {
+      for (int corner = 0; corner < 8; ++corner)
+        bounds_.extend(Vec3(toWorld * Vec4(corner & 1 ? b.hi.x : b.lo.x, corner & 2 ? b.hi.y : b.lo.y,
+                                           corner & 4 ? b.hi.z : b.lo.z, 1)));
+    };
+    place(instance.toWorld);
+    if (instance.motion != GroupInstance::kStill)
+      for (const Mat4& step : motions_[instance.motion]) place(step);
   }
 }
 
@@ -130,29 +179,40 @@ void Scene::markFilteredMeshes(bool full) {
   });
 }
 
-void Scene::appendEmitters(uint32_t meshIndex, const Mat4& toWorld) {
+void setShape(EmissiveTriangle& e, const Vec3* corners, bool mirrored) {
+  e.p0 = corners[0];
+  e.e1 = corners[1] - e.p0;
+  e.e2 = corners[2] - e.p0;
+  // In double: a triangle of 10⁻⁸ m sides would underflow in float.
+  glm::dvec3 cross = glm::cross(glm::dvec3(e.e1), glm::dvec3(e.e2));
+  if (mirrored) cross = -cross;
+  const double length = glm::length(cross);
+  e.normal = length > 0 ? Vec3(cross / length) : Vec3(0);
+  e.area = static_cast<float>(0.5 * length);
+}
+
+void Scene::appendEmitters(uint32_t meshIndex, uint32_t instance) {
   const TriangleMesh& mesh = data_.meshes[meshIndex];
   const Material& material = data_.materials[mesh.material];
+  const Mat4 toWorld = instance == kNoInstance ? Mat4(1) : instances_[instance].toWorld;
   const bool mirrored = glm::determinant(Mat3(toWorld)) < 0;
+  const bool moves = mesh.moves() || (instance != kNoInstance && instances_[instance].motion != GroupInstance::kStill);
   const size_t first = emitters_.size();
   emitters_.resize(first + mesh.triangles.size());
   parallelChunks(mesh.triangles.size(), 1024, [&](size_t begin, size_t end) {
     for (size_t t = begin; t < end; ++t) {
       const glm::uvec3& index = mesh.triangles[t];
       EmissiveTriangle& e = emitters_[first + t];
-      e.p0 = Vec3(toWorld * Vec4(mesh.positions[index.x], 1));
-      e.e1 = Vec3(toWorld * Vec4(mesh.positions[index.y], 1)) - e.p0;
-      e.e2 = Vec3(toWorld * Vec4(mesh.positions[index.z], 1)) - e.p0;
-      // In double: a triangle of 10⁻⁸ m sides would underflow in float.
-      glm::dvec3 cross = glm::cross(glm::dvec3(e.e1), glm::dvec3(e.e2));
-      if (mirrored) cross = -cross;
-      const double length = glm::length(cross);
-      e.normal = length > 0 ? Vec3(cross / length) : Vec3(0);
-      e.area = static_cast<float>(0.5 * length);
+      Vec3 corners[3];
+      for (int k = 0; k < 3; ++k) corners[k] = Vec3(toWorld * Vec4(mesh.positions[index[k]], 1));
+      setShape(e, corners, mirrored);
       e.mesh = meshIndex;
       e.triangle = static_cast<uint32_t>(t);
+      e.instance = instance;
       e.twoSided = material.doubleSided;
       e.textured = bool(material.emissiveTexture) || material.alphaMode != AlphaMode::Opaque;
+      e.moves = moves;
+      if (moves) averageOverSteps(e);
       e.meanRadiance = material.emission;
       if (e.textured) {
         // Centroid-like lattice of 28 points; only guides sampling, so a coarse mean is enough.
@@ -177,7 +237,7 @@ void Scene::collectEmitters() {
   for (uint32_t m : worldMeshes_) {
     if (!emits(m)) continue;
     meshEmitterBase_[m] = static_cast<int64_t>(emitters_.size());
-    appendEmitters(m, Mat4(1));
+    appendEmitters(m, kNoInstance);
   }
   instanceEmitterBase_.resize(instances_.size());
   for (size_t i = 0; i < instances_.size(); ++i) {
@@ -187,7 +247,7 @@ void Scene::collectEmitters() {
     for (size_t k = 0; k < group.meshes.size(); ++k) {
       if (!emits(group.meshes[k])) continue;
       instanceEmitterBase_[i][k] = static_cast<int64_t>(emitters_.size());
-      appendEmitters(group.meshes[k], instances_[i].toWorld);
+      appendEmitters(group.meshes[k], static_cast<uint32_t>(i));
     }
   }
 }
@@ -244,18 +304,6 @@ bool Scene::passThrough(uint32_t meshIndex, uint32_t triangle, float u, float v,
   // Coverage decided once per ray and triangle: the same answer if Embree asks twice.
   const uint32_t h = mix32(mix32((salt & ~kCameraRay) ^ (meshIndex * 0x9e3779b9u)) ^ triangle);
   return static_cast<float>(h >> 8) * 0x1p-24f >= a;
-}
-
-size_t Scene::geometryBytes() const {
-  size_t bytes = instances_.size() * sizeof(GroupInstance) + emitters_.size() * sizeof(EmissiveTriangle);
-  for (const TriangleMesh& m : data_.meshes)
-    bytes += m.positions.capacity() * sizeof(Vec3) + m.triangles.capacity() * sizeof(glm::uvec3) +
-             m.normals.capacity() * sizeof(Vec3) +
-             (m.tangents.capacity() + m.otherTangents[0].capacity() + m.otherTangents[1].capacity()) * sizeof(Vec4) +
-             m.colors.capacity() * sizeof(Vec4);
-  for (const TriangleMesh& m : data_.meshes)
-    for (const std::vector<Vec2>& uv : m.uv) bytes += uv.capacity() * sizeof(Vec2);
-  return bytes;
 }
 
 size_t Scene::textureBytes() const {

@@ -11,6 +11,7 @@
 #include "renderer/scene/accel.h"
 #include "renderer/scene/coincident.h"
 #include "renderer/scene/data/emitters.h"
+#include "renderer/scene/data/motion.h"
 #include "renderer/scene/environment.h"
 #include "renderer/scene/data/scene_data.h"
 #include "renderer/scene/traits.h"
@@ -65,6 +66,26 @@ class Scene : private HitFilter {
   // Coverage of a surface point in [0,1] (alpha mode OPAQUE: 1).
   float alpha(const TriangleMesh& mesh, uint32_t triangle, float u, float v) const;
 
+  // Whether anything is elsewhere while the shutter is open than at its opening, the camera included.
+  bool moves() const { return data_.motion.any(); }
+  // The time of a path that is traced when this share of the shutter's seconds has gone by.
+  float timeAt(float share) const { return shutterTime(data_.motion, share); }
+  // An instance and an emitter at a time; those that stand still are returned, others put into `moved`.
+  const GroupInstance& instanceAt(uint32_t instance, float time, GroupInstance& moved) const {
+    const GroupInstance& still = instances_[instance];
+    return still.motion == GroupInstance::kStill ? still : moveInstance(still, time, moved);
+  }
+  const EmissiveTriangle& emitterAt(size_t emitter, float time, EmissiveTriangle& moved) const {
+    const EmissiveTriangle& still = emitters_[emitter];
+    return still.moves ? moveEmitter(still, time, moved) : still;
+  }
+  // Where an emitter is while the shutter is open.
+  struct Sweep {
+    Bounds bounds;
+    bool turns = false;  // its normal is not always the same
+  };
+  Sweep sweepOf(const EmissiveTriangle& emitter) const;
+
   // Bytes of vertices, indices and textures (without Embree's own).
   size_t geometryBytes() const;
   size_t textureBytes() const;
@@ -73,11 +94,16 @@ class Scene : private HitFilter {
 
  private:
   bool passThrough(uint32_t mesh, uint32_t triangle, float u, float v, bool backFace, uint32_t salt) const override;
-  void separateFlattened();
+  void separateUnfit();
   void placeMeshes();
+  void placeGroups(const std::vector<uint32_t>& shared, const std::vector<std::vector<size_t>>& placements);
+  void findBounds();
+  const GroupInstance& moveInstance(const GroupInstance& instance, float time, GroupInstance& moved) const;
+  const EmissiveTriangle& moveEmitter(const EmissiveTriangle& emitter, float time, EmissiveTriangle& moved) const;
+  void averageOverSteps(EmissiveTriangle& emitter) const;
   void markFilteredMeshes(bool full);
   void collectEmitters();
-  void appendEmitters(uint32_t mesh, const Mat4& toWorld);
+  void appendEmitters(uint32_t mesh, uint32_t instance);
   void detectTraits();
 
   SceneData data_;
@@ -85,9 +111,10 @@ class Scene : private HitFilter {
   std::vector<uint32_t> worldMeshes_;
   std::vector<MeshGroup> groups_;
   std::vector<GroupInstance> instances_;
-  std::vector<uint8_t> filtered_;        // per mesh
-  std::vector<uint8_t> reachableBacks_;  // per mesh: rays may meet its back faces
-  std::vector<uint8_t> opaque_;          // per mesh: no light passes its surface, but through holes
+  std::vector<std::vector<Mat4>> motions_;  // of instances, at the steps 0, 1, …
+  std::vector<uint8_t> filtered_;           // per mesh
+  std::vector<uint8_t> reachableBacks_;     // per mesh: rays may meet its back faces
+  std::vector<uint8_t> opaque_;             // per mesh: no light passes its surface, but through holes
   std::vector<EmissiveTriangle> emitters_;
   std::vector<int64_t> meshEmitterBase_;  // per world mesh index: first emitter or -1
   std::vector<std::vector<int64_t>>
@@ -104,5 +131,8 @@ template <class T>
 T interpolate(const std::vector<T>& attribute, const glm::uvec3& triangle, float u, float v) {
   return attribute[triangle.x] * (1 - u - v) + attribute[triangle.y] * u + attribute[triangle.z] * v;
 }
+
+// The shape of an emissive triangle from its corners in the world; `mirrored`: its front is where they turn clockwise.
+void setShape(EmissiveTriangle& emitter, const Vec3* corners, bool mirrored);
 
 }  // namespace braid

@@ -61,6 +61,8 @@ class Integrator {
   virtual bool mayBeNegative() const { return false; }
   // Whether the passes of a bucket share a low-discrepancy sequence, for Accumulator::variance().
   virtual bool lowDiscrepancy(const Settings& settings) const { return settings.sampler == SamplerKind::Sobol; }
+  // Whether all paths of a pass have one time while the shutter is open, because paths of different pixels meet.
+  virtual bool passesAreInstants() const { return false; }
   // Whether pixels share their random numbers.
   virtual Correlation correlation() const { return Correlation::Independent; }
   // Whether it estimates the bias of its passes (PassTarget::bias).

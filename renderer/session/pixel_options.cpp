@@ -16,8 +16,13 @@ const char* yesOrNo(bool yes) { return yes ? "on" : "off"; }
 
 std::string cameraHash(const Camera& camera) {
   ContentHash hash;
-  for (const Mat4& m : {camera.worldToCamera(), camera.worldToNdc()})
-    for (int i = 0; i < 4; ++i) hash.add(&m[i], sizeof m[i]);
+  const auto add = [&](const Camera& c) {
+    for (const Mat4& m : {c.worldToCamera(), c.worldToNdc()})
+      for (int i = 0; i < 4; ++i) hash.add(&m[i], sizeof m[i]);
+  };
+  add(camera);
+  if (camera.moves())
+    for (const float time : {0.25f, 0.5f, 0.75f, 1.0f}) add(camera.at(time));
   return hexString(hash.value());
 }
 

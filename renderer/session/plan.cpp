@@ -125,7 +125,8 @@ void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
   part(kTraitPanes, "shadow rays through panes", "thin smooth transmissive surfaces let light straight through",
        "no thin smooth transmissive surface");
   part(kTraitVolume, "media tracking", "closed solids refract or attenuate", "no solid with a volume");
-  part(kTraitInstances, "instance transforms", "meshes placed several times",
+  part(kTraitInstances, "instance transforms",
+       scene.moves() ? "meshes placed several times, or moved" : "meshes placed several times",
        "every mesh is placed once and lies in world space");
   part(kTraitEnvironmentImage, "environment sampling", "an environment image, sampled by luminance",
        t.has(kTraitEnvironment) ? "the environment is constant" : "no environment");
@@ -148,6 +149,27 @@ void requireShadowAlpha(const Scene& scene, const Settings& settings) {
     throw Error(
         ExitCode::Usage,
         "--ground --transparent: only lamps light the ground, which cannot tell shadow from distance: give --env");
+}
+
+// What happens while the shutter is open, where one is asked for.
+void planMotion(const Scene& scene, Plan& plan) {
+  const SceneMotion& motion = scene.data().motion;
+  if (!(motion.seconds > 0)) return;
+  if (!scene.moves()) {
+    plan.lines.push_back(
+        {false, "motion blur", fmt::format("nothing moves within {:.4g} s of the shutter's opening", motion.seconds)});
+    return;
+  }
+  const size_t pieces = motion.times.size() - 1;
+  plan.lines.push_back(
+      {true, "motion blur",
+       fmt::format("the shutter is open for {:.4g} s; {} straight piece{} of motion, off by at most {:.2g} % of a way",
+                   motion.seconds, pieces, pieces == 1 ? "" : "s", 100 * motion.error)});
+  for (const PlannedIntegrator& p : plan.integrators)
+    if (p.integrator->passesAreInstants())
+      plan.lines.push_back(
+          {true, std::string(p.integrator->name()) + " instants",
+           "all paths of a pass are at one instant, as they meet: 4 samples show 4 instants over each other"});
 }
 
 // What the view has that the file has not, and the lens.
@@ -245,6 +267,7 @@ Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& sett
   requireShadowAlpha(scene, settings);
   planIntegrators(scene, plan.settings, available, plan);
   planSceneParts(scene, settings, plan);
+  planMotion(scene, plan);
   planView(scene, plan);
   plan.filmLine = plan.lines.size();
   planFilm(plan);

@@ -37,19 +37,24 @@ Frame tangentFrame(const Vec3& normal, const Vec4& tangent) {
   return Frame(s, glm::cross(normal, s) * (tangent.w < 0 ? -1.0f : 1.0f), normal);
 }
 
-// A tangent of the mesh at a hit, in the world.
-Vec4 tangentAt(const Scene& scene, const std::vector<Vec4>& tangents, const Hit& hit) {
-  const Vec4 tangent = interpolate(tangents, hit.mesh->triangles[hit.triangle], hit.u, hit.v);
-  if (hit.instance == kNoInstance) return tangent;
-  const Mat3 linear(scene.instances()[hit.instance].toWorld);
-  return Vec4(linear * Vec3(tangent), glm::determinant(linear) < 0 ? -tangent.w : tangent.w);
+// Whether a texture of the material follows tangents (Material::coatFrame) other than those of the shading frame.
+bool hasOtherTangents(const TriangleMesh& mesh, uint8_t frame) {
+  return frame != 0 && !mesh.otherTangents[frame - 1].empty();
 }
 
-// Tangents of the frame that a texture of the material follows (Material::coatFrame), if they are others than those of
-// the shading frame.
-const std::vector<Vec4>* otherTangents(const TriangleMesh& mesh, uint8_t frame) {
-  if (frame == 0 || mesh.otherTangents[frame - 1].empty()) return nullptr;
-  return &mesh.otherTangents[frame - 1];
+// Such a tangent at a hit, in the world.
+Vec4 otherTangentAt(const Scene& scene, const Hit& hit, uint8_t frame) {
+  const glm::uvec3& index = hit.mesh->triangles[hit.triangle];
+  const auto at = [&](const MeshVertices& v) { return interpolate(v.otherTangents[frame - 1], index, hit.u, hit.v); };
+  Vec4 tangent = at(*hit.mesh);
+  if (hit.mesh->moves()) {
+    const Moment m = momentAt(hit.time, hit.mesh->steps.size());
+    tangent = between(at(hit.mesh->step(m.first)), at(hit.mesh->step(m.first + 1)), m.fraction);
+  }
+  if (hit.instance == kNoInstance) return tangent;
+  GroupInstance moved;
+  const Mat3 linear(scene.instanceAt(hit.instance, hit.time, moved).toWorld);
+  return Vec4(linear * Vec3(tangent), glm::determinant(linear) < 0 ? -tangent.w : tangent.w);
 }
 
 // What a triangle's vertices give at a hit.
@@ -57,6 +62,27 @@ struct Interpolated {
   Vec3 ng, ns;  // not of unit length
   Vec4 tangent;
 };
+
+// The same of a mesh that moves: each vertex is between two steps first, as for Embree.
+Interpolated interpolateMoving(const TriangleMesh& mesh, Hit& hit) {
+  const glm::uvec3 index = mesh.triangles[hit.triangle];
+  const Moment m = momentAt(hit.time, mesh.steps.size());
+  const MeshVertices &a = mesh.step(m.first), &b = mesh.step(m.first + 1);
+  Vec3 p[3], largest(0);
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 &first = a.positions[index[k]], &second = b.positions[index[k]];
+    p[k] = between(first, second, m.fraction);
+    largest = glm::max(largest, glm::max(magnitudes(first), magnitudes(second)));
+  }
+  hit.position = (1 - hit.u - hit.v) * p[0] + hit.u * p[1] + hit.v * p[2];
+  hit.positionError = gammaBound(16) * maxComponent(largest);
+  const Vec3 ng = glm::cross(p[1] - p[0], p[2] - p[0]);
+  const auto attribute = [&](const auto& first, const auto& second) {
+    return between(interpolate(first, index, hit.u, hit.v), interpolate(second, index, hit.u, hit.v), m.fraction);
+  };
+  return {ng, mesh.normals.empty() ? ng : attribute(a.normals, b.normals),
+          mesh.tangents.empty() ? Vec4(0) : attribute(a.tangents, b.tangents)};
+}
 
 // Also places the hit.
 Interpolated interpolateAt(const TriangleMesh& mesh, Hit& hit) {
@@ -75,11 +101,13 @@ Interpolated interpolateAt(const TriangleMesh& mesh, Hit& hit) {
 }
 
 void toWorld(const GroupInstance& instance, Hit& hit, Interpolated& at) {
+  // A moving one is between two transforms first, and inverted anew by every ray.
+  const float operations = instance.motion == GroupInstance::kStill ? 4 : 16;
   const Mat3 linear(instance.toWorld);
   const Mat3 absolute(magnitudes(linear[0]), magnitudes(linear[1]), magnitudes(linear[2]));
   const Vec3 translation(instance.toWorld[3]);
   const Vec3 rounding = (1 + gammaBound(3)) * (absolute * Vec3(hit.positionError)) +
-                        gammaBound(4) * (absolute * magnitudes(hit.position) + magnitudes(translation));
+                        gammaBound(operations) * (absolute * magnitudes(hit.position) + magnitudes(translation));
   hit.positionError = maxComponent(rounding);
   hit.position = linear * hit.position + translation;
   // Normals go by the inverse transpose; that keeps the front side also in a mirrored instance.
@@ -120,8 +148,13 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
   hit.distance = query.t;
   hit.wo = -direction;
 
-  Interpolated at = interpolateAt(mesh, hit);
-  if (query.instance != kNoInstance) toWorld(scene.instances()[query.instance], hit, at);
+  hit.time = query.time;
+
+  Interpolated at = mesh.moves() ? interpolateMoving(mesh, hit) : interpolateAt(mesh, hit);
+  if (query.instance != kNoInstance) {
+    GroupInstance moved;
+    toWorld(scene.instanceAt(query.instance, query.time, moved), hit, at);
+  }
   at.ng = unitNormal(at.ng, hit.wo);
   hit.front = glm::dot(hit.wo, at.ng) >= 0;
   if (mesh.normals.empty()) {
@@ -176,8 +209,8 @@ class SurfacePoint {
 Vec3 SurfacePoint::mappedCoatNormal() const {
   const Material& m = material();
   const Vec3& smooth = hit_.smoothNormal;
-  if (const auto* tangents = otherTangents(*hit_.mesh, m.coatFrame)) {
-    const Frame f = tangentFrame(hit_.front ? smooth : -smooth, tangentAt(scene_, *tangents, hit_));
+  if (hasOtherTangents(*hit_.mesh, m.coatFrame)) {
+    const Frame f = tangentFrame(hit_.front ? smooth : -smooth, otherTangentAt(scene_, hit_, m.coatFrame));
     const Frame turned = hit_.front ? f : Frame(f.s, -f.t, -f.n);
     return turned.toWorld(mapNormal(texture(m.clearcoatNormalTexture), m.clearcoatNormalScale));
   }
@@ -196,8 +229,9 @@ Vec2 SurfacePoint::anisotropyDirection(Vec2 direction) const {
   direction = Vec2(c * direction.x - si * direction.y, si * direction.x + c * direction.y);
   const float length = glm::length(direction);
   const Vec2 d = length > 0 ? direction / length : Vec2(1, 0);
-  if (const auto* tangents = otherTangents(*hit_.mesh, m.anisotropyFrame)) {
-    const Frame f = tangentFrame(hit_.front ? hit_.frame.n : -hit_.frame.n, tangentAt(scene_, *tangents, hit_));
+  if (hasOtherTangents(*hit_.mesh, m.anisotropyFrame)) {
+    const Frame f =
+        tangentFrame(hit_.front ? hit_.frame.n : -hit_.frame.n, otherTangentAt(scene_, hit_, m.anisotropyFrame));
     return Vec2(hit_.frame.toLocal(d.x * f.s + d.y * f.t));
   }
   return hit_.front ? d : Vec2(d.x, -d.y);  // the frame's bitangent is turned on back faces

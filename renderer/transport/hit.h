@@ -19,6 +19,7 @@ struct Hit {
   float distance = 0;   // metres from the ray origin
   bool front = true;    // wo lies on the front side of the triangle
   float u = 0, v = 0;
+  float time = 0;  // of the ray
   uint32_t meshIndex = 0, triangle = 0, instance = kNoInstance;
   const TriangleMesh* mesh = nullptr;
   const Material* material = nullptr;

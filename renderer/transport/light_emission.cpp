@@ -50,7 +50,7 @@ LightEmission::LightEmission(const Scene& scene, const LightSampler& lights, con
   if (!(total > 0) || !std::isfinite(total)) return;
   for (double& s : sum) s /= total;
   cumulative_ = std::move(sum);
-  if (scene.traits().has(kTraitVolume)) findMedia();
+  if (scene.traits().has(kTraitVolume) && !scene.moves()) findMedia();
 }
 
 void LightEmission::findMedia() {
@@ -62,9 +62,9 @@ void LightEmission::findMedia() {
         const EmissiveTriangle& e = scene_.emitters()[light];
         const Vec3 centre = e.p0 + (e.e1 + e.e2) * (1.0f / 3);
         const float error = 1e-6f * maxComponent(glm::max(magnitudes(e.p0), magnitudes(centre)));
-        around[i] = mediaAround(scene_, offsetOrigin(centre, error, e.normal, e.normal), e.normal);
+        around[i] = mediaAround(scene_, offsetOrigin(centre, error, e.normal, e.normal), e.normal, 0);
       } else {
-        around[i] = mediaAround(scene_, lights_.positional(light).position, Vec3(0.36f, 0.48f, 0.8f));
+        around[i] = mediaAround(scene_, lights_.positional(light).position, Vec3(0.36f, 0.48f, 0.8f), 0);
       }
     }
   });
@@ -72,15 +72,21 @@ void LightEmission::findMedia() {
     if (!around[i].empty()) media_.emplace_back(i, around[i]);
 }
 
-const MediaStack& LightEmission::mediaAt(uint32_t light) const {
-  static const MediaStack kNone;
-  const auto found = std::lower_bound(media_.begin(), media_.end(), light,
+// Where things move, each path looks for itself.
+MediaStack LightEmission::mediaAt(const LightStart& start) const {
+  if (scene_.moves()) {
+    if (!start.finite || !scene_.traits().has(kTraitVolume)) return {};
+    const Vec3 origin = offsetOrigin(start.position, start.positionError, start.normal, start.direction);
+    return mediaAround(scene_, origin, start.direction, start.time);
+  }
+  const auto found = std::lower_bound(media_.begin(), media_.end(), start.light,
                                       [](const auto& entry, uint32_t l) { return entry.first < l; });
-  return found != media_.end() && found->first == light ? found->second : kNone;
+  return found != media_.end() && found->first == start.light ? found->second : MediaStack();
 }
 
-bool LightEmission::sample(double uSelect, Vec2 uPosition, Vec2 uDirection, LightStart& out) const {
+bool LightEmission::sample(double uSelect, Vec2 uPosition, Vec2 uDirection, float time, LightStart& out) const {
   if (cumulative_.empty()) return false;
+  out.time = time;
   const auto found = std::upper_bound(cumulative_.begin() + 1, cumulative_.end() - 1, uSelect);
   out.light = static_cast<uint32_t>(found - cumulative_.begin() - 1);
   // Lights of zero power at the end of the table share its last bound.
@@ -92,7 +98,8 @@ bool LightEmission::sample(double uSelect, Vec2 uPosition, Vec2 uDirection, Ligh
 }
 
 bool LightEmission::startOnTriangle(uint32_t light, Vec2 uPosition, Vec2 uDirection, LightStart& out) const {
-  const EmissiveTriangle& e = scene_.emitters()[light];
+  EmissiveTriangle moved;
+  const EmissiveTriangle& e = scene_.emitterAt(light, out.time, moved);
   const Vec2 b = squareToTriangle(uPosition);
   float side = 1;
   if (e.twoSided) {
@@ -107,7 +114,7 @@ bool LightEmission::startOnTriangle(uint32_t light, Vec2 uPosition, Vec2 uDirect
   out.cosLight = local.z;
   out.finite = true;
   out.delta = false;
-  out.pdfEmit = pdfEmit(light, out.direction, out.cosLight);
+  out.pdfEmit = pdfEmit(light, out.direction, out.cosLight, out.time);
   const Spectrum radiance =
       e.textured ? scene_.coveredEmission(scene_.mesh(e.mesh), e.triangle, b.x, b.y) : e.meanRadiance;
   out.throughput = radiance * (out.cosLight / out.pdfEmit);
@@ -116,19 +123,20 @@ bool LightEmission::startOnTriangle(uint32_t light, Vec2 uPosition, Vec2 uDirect
 
 bool LightEmission::startAtPoint(uint32_t light, Vec2 uDirection, LightStart& out) const {
   const PunctualLight& l = lights_.positional(light);
-  out.position = l.position;
+  const LightPlace place = placeAt(l, out.time);
+  out.position = place.position;
   out.positionError = 0;
   Spectrum intensity = l.intensity;
   if (l.kind == PunctualKind::Point) {
     out.direction = squareToUniformSphere(uDirection);
   } else {
-    out.direction = renormalize(Frame(l.direction).toWorld(squareToCone(uDirection, coneOpening(l))));
-    intensity *= spotFalloff(l, glm::dot(out.direction, l.direction));
+    out.direction = renormalize(Frame(place.direction).toWorld(squareToCone(uDirection, coneOpening(l))));
+    intensity *= spotFalloff(l, glm::dot(out.direction, place.direction));
   }
   out.normal = out.direction;
   out.cosLight = 1;
   out.finite = out.delta = true;
-  out.pdfEmit = pdfEmit(light, out.direction, 1);
+  out.pdfEmit = pdfEmit(light, out.direction, 1, out.time);
   out.throughput = intensity / out.pdfEmit;
   return true;
 }
@@ -137,7 +145,7 @@ bool LightEmission::startAtInfinity(uint32_t light, Vec2 uPosition, Vec2 uDirect
   Spectrum radiance;
   if (light < lights_.environmentLight()) {
     const PunctualLight& l = lights_.directional(light);
-    out.direction = l.direction;
+    out.direction = placeAt(l, out.time).direction;
     out.delta = true;
     radiance = l.intensity;
   } else {
@@ -155,16 +163,17 @@ bool LightEmission::startAtInfinity(uint32_t light, Vec2 uPosition, Vec2 uDirect
   out.normal = out.direction;
   out.cosLight = 1;
   out.finite = false;
-  out.pdfEmit = pdfEmit(light, out.direction, 1);
+  out.pdfEmit = pdfEmit(light, out.direction, 1, out.time);
   out.throughput = radiance / out.pdfEmit;
   return true;
 }
 
-float LightEmission::pdfEmit(uint32_t light, const Vec3& direction, float cosLight) const {
+float LightEmission::pdfEmit(uint32_t light, const Vec3& direction, float cosLight, float time) const {
   if (cumulative_.empty()) return 0;
   const auto choice = static_cast<float>(probability(light));
   if (light < lights_.firstPositional()) {
-    const EmissiveTriangle& e = scene_.emitters()[light];
+    EmissiveTriangle moved;
+    const EmissiveTriangle& e = scene_.emitterAt(light, time, moved);
     return choice * cosLight * kInvPi * (e.twoSided ? 0.5f : 1.0f) / e.area;
   }
   if (light < lights_.firstDirectional()) return choice * conePdf(lights_.positional(light));

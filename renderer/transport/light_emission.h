@@ -21,6 +21,7 @@ struct LightStart {
   float pdfEmit = 0;        // see LightEmission::pdfEmit()
   float cosLight = 1;       // cosine at an emissive triangle, 1 for all others
   uint32_t light = 0;       // LightSampler's number
+  float time = 0;           // of the path
   bool finite = true;       // false: directional lights and the environment
   bool delta = false;       // no ray can hit the light
 };
@@ -32,13 +33,13 @@ class LightEmission {
 
   // uSelect has 48 bits where a product of two variates gives them, so that a million lights keep their exact shares.
   // False: nothing emits.
-  bool sample(double uSelect, Vec2 uPosition, Vec2 uDirection, LightStart& out) const;
+  bool sample(double uSelect, Vec2 uPosition, Vec2 uDirection, float time, LightStart& out) const;
 
   // Density with which sample() starts a path at a given light, including its choice: per m² (of the triangle) and
   // steradian for emissive triangles, per steradian for point and spot lights, per m² (of the disc) for directional
   // lights, per m² and steradian for the environment. `direction` leads away from the light; cosLight > 0 is the cosine
   // at an emissive triangle.
-  float pdfEmit(uint32_t light, const Vec3& direction, float cosLight) const;
+  float pdfEmit(uint32_t light, const Vec3& direction, float cosLight, float time) const;
 
   bool empty() const { return cumulative_.empty(); }
   double probability(uint32_t light) const {
@@ -46,8 +47,8 @@ class LightEmission {
   }
   // Total emitted power, W, channel average; lights at infinity count what crosses the scene's disc.
   double power() const { return power_; }
-  // The solids around a light; empty for lights at infinity and in scenes without volumes.
-  const MediaStack& mediaAt(uint32_t light) const;
+  // The solids around the light of a start; empty for lights at infinity and in scenes without volumes.
+  MediaStack mediaAt(const LightStart& start) const;
 
  private:
   bool startOnTriangle(uint32_t light, Vec2 uPosition, Vec2 uDirection, LightStart& out) const;

@@ -109,7 +109,10 @@ VisibleCells findVisibleCells(const TransportContext& context, const PassSampler
       // Rows of the frame are stratified.
       const Vec2 raster(u.u[slot::kPixelX] * static_cast<float>(width),
                         (static_cast<float>(i) + u.u[slot::kPixelY]) / kEyePaths * static_cast<float>(height));
-      batch.startCamera(key, camera.ray(raster), MediaStack(), 1, 1, camera.orthographic());
+      const float time = context.scene.timeAt(u.u[slot::kTime]);
+      Camera::CameraRay ray = CameraAt(camera, time)->ray(raster);
+      ray.time = time;
+      batch.startCamera(key, ray, MediaStack(), 1, 1, camera.orthographic());
     }
     batch.run(onHit, [](int, const SubpathState&) {});
   }
@@ -184,11 +187,12 @@ void startLightPath(const TransportContext& context, const LightEmission& emissi
   const SampleBlock u = sampler.block(key, 1);
   const double select = (static_cast<double>(item) + static_cast<double>(u.u[slot::kLightSelect])) / kPaths;
   LightStart start;
-  const bool ok =
-      emission.sample(select, {u.u[slot::kLightU], u.u[slot::kLightV]}, {u.u[slot::kBsdfU], u.u[slot::kBsdfV]}, start);
+  const float time = context.scene.timeAt(u.u[slot::kExtra]);
+  const bool ok = emission.sample(select, {u.u[slot::kLightU], u.u[slot::kLightV]},
+                                  {u.u[slot::kBsdfU], u.u[slot::kBsdfV]}, time, start);
   // The environment fills so much of what surfaces see that camera paths find it.
   if (ok && start.light != context.lights.environmentLight())
-    batch.startLight(key, start, emission.mediaAt(start.light));
+    batch.startLight(key, start, emission.mediaAt(start));
   else
     batch.startNothing();
 }

@@ -72,8 +72,8 @@ class Glance {
     const SampleBlock u = sampler_.block(vertex.key, vertex.block);
     const Hit& hit = vertex.hit;
     LightSample light;
-    if (!context_.lights.sample(hit.position, vertex.receiverNormal(), vertex.twoSided, u.u[slot::kLightSelect],
-                                {u.u[slot::kLightU], u.u[slot::kLightV]}, light))
+    if (!context_.lights.sample(vertex.receiver(), u.u[slot::kLightSelect], {u.u[slot::kLightU], u.u[slot::kLightV]},
+                                light))
       return;
     // As in the path tracer: from the side that is seen by both normals, unless the surface transmits.
     const float shading = glm::dot(light.wi, hit.frame.n);
@@ -113,9 +113,13 @@ LitShare measureLitShare(const TransportContext& context, const Camera& camera, 
   LitShare lit;
   for (int first = 0; first < kCameraPaths; first += kBatch) {
     batch.clear();
-    for (int i = first; i < first + kBatch; ++i)
-      batch.startCamera(sampler.itemKey(static_cast<uint64_t>(i)), camera.ray(framePoint(i) * frame), media, 1, 1,
-                        camera.orthographic());
+    for (int i = first; i < first + kBatch; ++i) {
+      const uint64_t key = sampler.itemKey(static_cast<uint64_t>(i));
+      const float time = context.scene.timeAt(sampler.block(key, 0).u[slot::kTime]);
+      Camera::CameraRay ray = CameraAt(camera, time)->ray(framePoint(i) * frame);
+      ray.time = time;
+      batch.startCamera(key, ray, media, 1, 1, camera.orthographic());
+    }
     Glance glance(context, sampler);
     batch.run([&](int index, const SubpathState&, const SubpathVertex& v) { return glance.onHit(index, v); },
               [&](int index, const SubpathState& state) { glance.onMiss(index, state); });

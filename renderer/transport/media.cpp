@@ -5,14 +5,14 @@
 
 namespace braid {
 
-MediaStack mediaAround(const Scene& scene, const Vec3& point, const Vec3& direction) {
+MediaStack mediaAround(const Scene& scene, const Vec3& point, const Vec3& direction, float time) {
   constexpr int kMaxCrossings = 256;
   MediaStack around, entered;
   Vec3 origin = point;
   for (int i = 0; i < kMaxCrossings; ++i) {
     RayBatch ray;
     RayHit query;
-    ray.set(0, {origin, direction, kInfinity, 0});
+    ray.set(0, {origin, direction, kInfinity, 0, time});
     scene.accel().intersect(ray, 1, &query);
     if (!(query.t < kInfinity)) break;
     Hit hit;
@@ -28,8 +28,10 @@ MediaStack mediaAround(const Scene& scene, const Vec3& point, const Vec3& direct
   return around;
 }
 
-MediaStack mediaOfCamera(const Scene& scene, const Camera& camera) {
-  return scene.traits().has(kTraitVolume) ? mediaAround(scene, camera.position(), camera.forward()) : MediaStack();
+MediaStack mediaOfCamera(const Scene& scene, const Camera& camera, float time) {
+  if (!scene.traits().has(kTraitVolume)) return {};
+  const CameraAt at(camera, time);
+  return mediaAround(scene, at->position(), at->forward(), time);
 }
 
 }  // namespace braid

@@ -58,10 +58,10 @@ class MediaStack {
 
 // The solids around a point that no surface lies between it and, found by following a ray to infinity: what is left
 // without having been entered was around the start. For cameras and lights inside of solids.
-MediaStack mediaAround(const Scene& scene, const Vec3& point, const Vec3& direction);
+MediaStack mediaAround(const Scene& scene, const Vec3& point, const Vec3& direction, float time);
 
-// The solids that the camera is inside of.
-MediaStack mediaOfCamera(const Scene& scene, const Camera& camera);
+// The solids that the camera is inside of at a time.
+MediaStack mediaOfCamera(const Scene& scene, const Camera& camera, float time = 0);
 
 // Beer-Lambert transmittance over a distance in metres (KHR_materials_volume: attenuationColor after
 // attenuationDistance).

@@ -10,8 +10,8 @@ namespace braid {
 inline constexpr float kShadowLength = 1 - 1e-4f;
 
 // From one point to another, both already lifted off their surfaces.
-inline RayQuery connectionRay(const Vec3& from, const Vec3& to, uint32_t salt) {
-  return {from, to - from, kShadowLength, salt};
+inline RayQuery connectionRay(const Vec3& from, const Vec3& to, uint32_t salt, float time) {
+  return {from, to - from, kShadowLength, salt, time};
 }
 
 // From a hit to a light in the unit direction wi; the distance is infinite for directional lights and the environment.
@@ -20,6 +20,7 @@ inline void setShadowRay(const Hit& hit, const Vec3& wi, float distance, uint32_
   ray.direction = wi;
   ray.tmax = kInfinity;
   ray.salt = salt;
+  ray.time = hit.time;
   if (!(distance < kInfinity)) return;
   // TRAP: aimed anew from the moved origin. On a large triangle the move is longer than the margin before a near light:
   // the light would hide itself.

@@ -72,6 +72,7 @@ void SubpathBatch::startCamera(uint64_t key, const Camera::CameraRay& ray, const
   s.key = key;
   s.origin = ray.origin;
   s.direction = ray.direction;
+  s.time = ray.time;
   s.media = media;
   s.byDistance = !orthographic;
   if (settings_.mis) s.mis.vcm = sqr(lightPaths / pdfPixel);  // (31)
@@ -85,6 +86,7 @@ void SubpathBatch::startLight(uint64_t key, const LightStart& start, const Media
                  ? offsetOrigin(start.position, start.positionError, start.normal, start.direction)
                  : start.position;
   s.direction = start.direction;
+  s.time = start.time;
   s.throughput = start.throughput;
   s.startThroughput = maxComponent(start.throughput);
   s.media = media;
@@ -109,7 +111,7 @@ void SubpathBatch::queueRay(int slot, SubpathState& state) {
     const uint32_t salt = sampler_.salt(state.key, state.block() + static_cast<uint32_t>(state.nullCrossings));
     state.salt = (salt & ~kCameraRay) | (camera ? kCameraRay : 0);
   }
-  rays_.set(slot, {state.origin, state.direction, kInfinity, state.salt});
+  rays_.set(slot, {state.origin, state.direction, kInfinity, state.salt, state.time});
 }
 
 void SubpathBatch::trace(int active) {
@@ -146,7 +148,7 @@ bool SubpathBatch::applyRange(SubpathState& state, const Hit& hit) const {
     return true;
   const PunctualLight& light = lights.positional(state.light);
   if (!(light.range < kInfinity)) return true;
-  const float window = rangeWindow(light, glm::length(hit.position - light.position));
+  const float window = rangeWindow(light, glm::length(hit.position - placeAt(light, hit.time).position));
   if (!(window > 0)) return false;
   state.throughput *= window / state.window;
   state.window = window;
@@ -159,8 +161,8 @@ MisQuantities SubpathBatch::quantitiesAt(const SubpathState& state, const Hit& h
   if (settings_.transport == Transport::Power && state.atStart) {
     // (31)-(33), here and not at the start because the density of choosing the light depends on where its path arrives.
     const bool twoSided = (context_.summaryOf(hit).lobes & kTransmittingLobes) != 0;
-    const float direct = context_.lights.pdfDirect(state.light, hit.position, twoSided ? hit.ng : hit.frame.n, twoSided,
-                                                   -state.direction);
+    const Receiver at{hit.position, twoSided ? hit.ng : hit.frame.n, twoSided, hit.time};
+    const float direct = context_.lights.pdfDirect(state.light, at, -state.direction);
     const double emit = static_cast<double>(state.pdfEmit);
     m.vcm = sqr(static_cast<double>(direct) / emit);
     m.vc = state.deltaLight ? 0.0 : sqr(static_cast<double>(state.cosLight) / emit);

@@ -62,6 +62,7 @@ struct SubpathVertex {
   SubpathVertex(const Spectrum& albedo, const Vec3& o) : bsdf(albedo, o), wo(o) {}
   // The normal by which lights are chosen here.
   const Vec3& receiverNormal() const { return twoSided ? hit.ng : hit.frame.n; }
+  Receiver receiver() const { return {hit.position, receiverNormal(), twoSided, hit.time}; }
 };
 
 // The BSDF of a vertex toward a direction, for connections.
@@ -89,6 +90,7 @@ struct SubpathState {
   float passed = 0;          // metres from where it scattered to the last pane since
   float travelled = 0;       // metres since the start
   uint32_t salt = 0;
+  float time = 0;
   float startThroughput = 1;
   float etaScale = 1;
   bool byDistance = true;  // densities of the first hit depend on its distance: not for parallel rays
@@ -104,6 +106,7 @@ struct SubpathState {
   // The last vertex that scattered, for the weight of lights that the walk hits.
   Vec3 lastPosition{0}, lastNormal{0};
   bool lastTwoSided = false;
+  Receiver lastReceiver() const { return {lastPosition, lastNormal, lastTwoSided, time}; }
   float lastPdfW = 0;                  // of the direction sampled there
   bool lightCouldNotBeSampled = true;  // camera, delta scattering, or a null interface since
 

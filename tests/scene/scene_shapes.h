@@ -76,7 +76,7 @@ inline SceneData lampsAndInstances() {
                              turned({-5, 0, 0}, 2, {0, 1, 0}, {1, 2, 0.5f}),
                              turned({0, 0, 9}, 1, {1, 0, 1}, {-1, 1, 1})};
   for (const Mat4& m : placements)
-    for (const uint32_t mesh : {1u, 2u}) data.instances.push_back({mesh, m});
+    for (const uint32_t mesh : {1u, 2u}) data.instances.push_back({mesh, m, {}});
   return data;
 }
 

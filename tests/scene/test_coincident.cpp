@@ -130,7 +130,7 @@ TEST_CASE("Faces back to back in one mesh, doubled, and as two placements of one
     data.materials = {paint(Spectrum(0.5f))};
     addMesh(data, front(kWalls[0]), 0);
     data.instances[0].toWorld = glm::translate(Mat4(1), at);
-    data.instances.push_back({0, glm::rotate(glm::translate(Mat4(1), at), kPi, Vec3(0, 1, 0))});
+    data.instances.push_back({0, glm::rotate(glm::translate(Mat4(1), at), kPi, Vec3(0, 1, 0)), {}});
     CHECK(wrongHits(Scene(std::move(data)), {kWalls[0].p + at, kWalls[0].a, kWalls[0].b}, 0, 0) == 0);
   }
 }

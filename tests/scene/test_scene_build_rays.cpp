@@ -39,8 +39,8 @@ TEST_CASE("A mesh pressed flat by its transform is drawn, alone and among other 
     SceneData data = oneMesh(std::move(sphere), singleSided(diffuseMaterial(Spectrum(0.5f), Spectrum(1))));
     data.instances[0].toWorld = flat;
     if (repeated) {
-      data.instances.push_back({0, glm::translate(Mat4(1), Vec3(50, 0, 0))});
-      data.instances.push_back({0, glm::translate(Mat4(1), Vec3(60, 0, 0))});
+      data.instances.push_back({0, glm::translate(Mat4(1), Vec3(50, 0, 0)), {}});
+      data.instances.push_back({0, glm::translate(Mat4(1), Vec3(60, 0, 0)), {}});
     }
     const Scene scene(std::move(data));
     CAPTURE(repeated);
@@ -74,7 +74,7 @@ TEST_CASE("Camera rays pass the back of an open single-sided surface, all others
     for (const Mat4& placement : {Mat4(1), mirror}) {
       SceneData data = oneMesh(quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), singleSided());
       data.instances[0].toWorld = placement;
-      if (instanced) data.instances.push_back({0, glm::translate(Mat4(1), Vec3(50, 0, 0))});
+      if (instanced) data.instances.push_back({0, glm::translate(Mat4(1), Vec3(50, 0, 0)), {}});
       const Scene scene(std::move(data));
       CAPTURE(instanced);
       CAPTURE(placement[0][0]);
@@ -133,7 +133,7 @@ SceneData scatteredTriangles(Rng& rng, float scale, float away, bool instanced) 
   SceneData data = oneMesh(std::move(mesh), diffuseMaterial(Spectrum(0.5f)));
   if (instanced) {
     data.instances[0].toWorld = turned(scale * Vec3(3, 1, 2), 1, {1, 2, 3}, {1.5f, 0.7f, 1});
-    data.instances.push_back({0, turned(scale * Vec3(90, 1, 2), 2, {3, 2, 1}, {-1, 1, 3})});
+    data.instances.push_back({0, turned(scale * Vec3(90, 1, 2), 2, {3, 2, 1}, {-1, 1, 3}), {}});
   }
   return data;
 }

@@ -257,7 +257,7 @@ SceneData gallery(const std::vector<Mat4>& places, bool instanced) {
     const auto index = static_cast<uint32_t>(data.meshes.size());
     for (const Mat4& place : places) {
       if (!instanced) addMesh(data, moved(mesh, place), m);
-      if (instanced) data.instances.push_back({index, place});
+      if (instanced) data.instances.push_back({index, place, {}});
     }
     if (!instanced) continue;
     data.meshes.push_back(mesh);

@@ -54,7 +54,7 @@ LightStart draw(const LightEmission& emission, Rng& rng) {
   LightStart start;
   const double select = static_cast<double>(rng.next()) + static_cast<double>(rng.next()) * 0x1p-24;
   const Vec2 position = rng.next2();
-  if (!emission.sample(select, position, rng.next2(), start)) start.throughput = Spectrum(0);
+  if (!emission.sample(select, position, rng.next2(), 0, start)) start.throughput = Spectrum(0);
   return start;
 }
 
@@ -74,7 +74,7 @@ TEST_CASE("Light subpaths carry the power of their lights, and know their densit
       const double power = static_cast<double>(average(s.throughput));
       sum += power;
       squares += power * power;
-      CHECK(s.pdfEmit == doctest::Approx(emission.pdfEmit(s.light, s.direction, s.cosLight)).epsilon(1e-5));
+      CHECK(s.pdfEmit == doctest::Approx(emission.pdfEmit(s.light, s.direction, s.cosLight, 0)).epsilon(1e-5));
       CHECK(std::fabs(glm::length(s.direction) - 1) < 1e-4f);
       CHECK(glm::dot(s.direction, s.normal) > 0);
     }
@@ -156,9 +156,9 @@ TEST_CASE("A starting point and its density see the same probability of being ch
       const Vec3 p(rng.next() - 0.5f, -0.9f, rng.next() - 0.5f), n(0, 1, 0);
       LightSample s;
       const float select = rng.next();
-      if (!lights.sample(p, n, false, select, rng.next2(), s)) continue;
+      if (!lights.sample({p, n}, select, rng.next2(), s)) continue;
       ++found;
-      float direct = lights.pdfDirect(s.light, p, n, false, s.wi);
+      float direct = lights.pdfDirect(s.light, {p, n}, s.wi);
       if (s.light < lights.firstPositional()) {
         const float cosine = std::fabs(glm::dot(s.wi, scene.emitters()[s.light].normal));
         direct *= sqr(s.distance) / cosine;

@@ -114,7 +114,7 @@ TEST_CASE("The hierarchy chooses a lamp with a range wherever its light arrives"
                  std::sin(1.3f * static_cast<float>(i)) * 0.9f);
     for (uint32_t k = 0; k < 3; ++k) {
       const float window = rangeWindow(lamps[k], glm::length(p - lamps[k].position));
-      const float chance = lights.pdfDirect(k, p, Vec3(0), true, Vec3(0, 1, 0));
+      const float chance = lights.pdfDirect(k, {p, Vec3(0), true}, Vec3(0, 1, 0));
       missed += lamps[k].kind == PunctualKind::Point && window > 0 && !(chance > 0);
       useless += window == 0 && chance > 0 && glm::length(p - lamps[k].position) > 1.001f * lamps[k].range;
     }

@@ -76,7 +76,7 @@ double emittersPValue(const Scene& scene, const LightSampler& lights, const Vec3
       const float distance = glm::length(d), facing = -glm::dot(d, e.normal) / distance;
       const float cosine = e.twoSided ? std::fabs(facing) : facing;
       if (!(cosine > 0) || (!twoSided && glm::dot(d, n) <= 0)) continue;
-      const float share = lights.pdfEmitter(p, n, twoSided, i, distance, cosine) * cosine / sqr(distance) * e.area;
+      const float share = lights.pdfEmitter({p, n, twoSided}, i, distance, cosine) * cosine / sqr(distance) * e.area;
       const double samples = count * static_cast<double>(share) / (kGrid * kGrid);
       expected[i * kCells + cellOf(e, q)] += samples;
       expected.back() -= samples;
@@ -84,7 +84,7 @@ double emittersPValue(const Scene& scene, const LightSampler& lights, const Vec3
   for (int k = 0; k < count; ++k) {
     LightSample s;
     const float select = rng.next();
-    if (!lights.sample(p, n, twoSided, select, rng.next2(), s)) {
+    if (!lights.sample({p, n, twoSided}, select, rng.next2(), s)) {
       observed.back() += 1;
       continue;
     }
@@ -107,7 +107,7 @@ double choiceOf(const Scene& scene, const LightSampler& lights, const Vec3& p, c
   const float distance = glm::length(d), cosine = std::fabs(glm::dot(d, e.normal)) / distance;
   const double density =
       static_cast<double>(sqr(distance)) / (static_cast<double>(cosine) * static_cast<double>(e.area));
-  return static_cast<double>(lights.pdfEmitter(p, n, false, i, distance, cosine)) / density;
+  return static_cast<double>(lights.pdfEmitter({p, n}, i, distance, cosine)) / density;
 }
 
 }  // namespace
@@ -133,13 +133,13 @@ TEST_CASE("A sample's density is the one that the same direction has as a hit") 
       const Vec3 p = randomPoint(rng), n = randomDirection(rng);
       LightSample s;
       const float select = rng.next();
-      if (!lights.sample(p, n, false, select, rng.next2(), s)) continue;
+      if (!lights.sample({p, n}, select, rng.next2(), s)) continue;
       float best = kInfinity, stated = 0;
       for (size_t e = 0; e < scene.emitters().size(); ++e) {
         const float distance = distanceTo(scene.emitters()[e], p, s.wi);
         if (!(std::fabs(distance - s.distance) < best)) continue;
         best = std::fabs(distance - s.distance);
-        stated = lights.pdfEmitter(p, n, false, e, distance, std::fabs(glm::dot(s.wi, scene.emitters()[e].normal)));
+        stated = lights.pdfEmitter({p, n}, e, distance, std::fabs(glm::dot(s.wi, scene.emitters()[e].normal)));
       }
       if (best < 1e-3f) CHECK(s.pdfW == doctest::Approx(stated).epsilon(2e-3));
     }
@@ -218,7 +218,7 @@ TEST_CASE("Finite, directional and environment light add up to the irradiance") 
     for (int i = 0; i < kSamples; ++i) {
       LightSample s;
       const float select = rng.next();
-      if (!lights.sample(Vec3(0), {0, 1, 0}, false, select, rng.next2(), s) || s.wi.y <= 0) continue;
+      if (!lights.sample({Vec3(0), {0, 1, 0}}, select, rng.next2(), s) || s.wi.y <= 0) continue;
       const double value = static_cast<double>(s.radiance.x * s.wi.y / s.pdfW);
       sum += value;
       squares += value * value;
@@ -241,20 +241,20 @@ TEST_CASE("Punctual lights end at their range and outside their cone") {
   const Scene scene(std::move(data));
   const LightSampler lights(scene, LightStrategy::Automatic);
   LightSample s;
-  CHECK(lights.sample({0, 0, 0}, {0, 1, 0}, false, 0.5f, Vec2(0.5f), s));
+  CHECK(lights.sample({{0, 0, 0}, {0, 1, 0}}, 0.5f, Vec2(0.5f), s));
   CHECK(s.delta);
   CHECK(s.pdfW == 1);
   const double atTwoThirds = 1 - 16.0 / 81;  // the window of KHR_lights_punctual
   CHECK(s.radiance.x == doctest::Approx(0.25 * atTwoThirds));
-  CHECK_FALSE(lights.sample({0, -1.1f, 0}, {0, 1, 0}, false, 0.5f, Vec2(0.5f), s));
-  CHECK_FALSE(lights.sample({1.5f, 0, 0}, {0, 1, 0}, false, 0.5f, Vec2(0.5f), s));
+  CHECK_FALSE(lights.sample({{0, -1.1f, 0}, {0, 1, 0}}, 0.5f, Vec2(0.5f), s));
+  CHECK_FALSE(lights.sample({{1.5f, 0, 0}, {0, 1, 0}}, 0.5f, Vec2(0.5f), s));
 }
 
 TEST_CASE("A scene without light has nothing to draw") {
   const Scene scene{SceneData()};
   const LightSampler lights(scene, LightStrategy::Automatic);
   LightSample s;
-  CHECK_FALSE(lights.sample(Vec3(0), {0, 1, 0}, false, 0.5f, Vec2(0.5f), s));
+  CHECK_FALSE(lights.sample({Vec3(0), {0, 1, 0}}, 0.5f, Vec2(0.5f), s));
   CHECK(lights.pdfEnvironment({0, 1, 0}) == 0);
 }
 

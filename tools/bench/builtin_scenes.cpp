@@ -57,7 +57,7 @@ void addSphere(TriangleMesh& mesh, const Vec3& centre, float radius, int level) 
 
 void addMesh(SceneData& data, TriangleMesh mesh, uint32_t material) {
   mesh.material = material;
-  data.instances.push_back({static_cast<uint32_t>(data.meshes.size()), Mat4(1)});
+  data.instances.push_back({static_cast<uint32_t>(data.meshes.size()), Mat4(1), {}});
   data.meshes.push_back(std::move(mesh));
 }
 

@@ -61,6 +61,7 @@ std::vector<Attribute> planAttributes(const Scene& scene, const Plan& plan, cons
   const SceneData& data = scene.data();
   if (data.defaultLight) list.push_back(textAttribute("braid/defaultLight", data.backdrop ? "studio" : "dome"));
   if (data.defaultCamera) list.push_back(textAttribute("braid/defaultCamera", "framed"));
+  if (data.motion.seconds > 0) list.push_back(numberAttribute("braid/shutter", data.motion.seconds));
   if (plan.camera.lensRadius() > 0) {
     list.push_back(numberAttribute("braid/lensDiameter", 2 * static_cast<double>(plan.camera.lensRadius())));
     list.push_back(numberAttribute("focus", static_cast<double>(plan.camera.focusDistance())));

@@ -54,6 +54,9 @@ LoadOptions loadOptions(const SceneChoice& c) {
   options.camera = c.lookAt ? "none" : c.camera;
   if (c.frameScene >= 0) options.scene = c.frameScene;
   if (c.frameTime >= 0) options.frameTime = static_cast<float>(c.frameTime);
+  if (c.load.shutter > 0 && !options.frameTime)
+    throw Error(ExitCode::Usage,
+                "--shutter: nothing moves in the pose at rest: give --frame-time SECONDS, or --frames to a render");
   return options;
 }
 

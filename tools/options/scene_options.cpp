@@ -48,6 +48,11 @@ void addFrameOptions(CLI::App& command, SceneChoice& c) {
       .add_option("--frame-time", c.frameTime,
                   "Pose of skins, morphs and nodes at this time of an animation, in seconds")
       ->check(number(0, 1e9));
+  command
+      .add_option("--shutter", c.load.shutter,
+                  "Motion blur: the shutter is open for so many seconds from the frame's time on; with 24 frames a "
+                  "second 180 degrees are 1/48 s = 0.0208 (default: 0)")
+      ->check(number(0, 1e9));
   command.add_option("--animation", c.load.animation, "Animation by name or index (default: the first)")
       ->type_name("NAME");
 }

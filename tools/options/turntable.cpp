@@ -13,10 +13,10 @@ void turnAbout(const glm::dvec3& axis, const glm::dvec3& origin, double turns, C
   if (turns == 0) return;  // to the bit
   const glm::dvec3 foot = axis - origin;
   const double angle = 2 * glm::pi<double>() * turns;
-  const glm::dmat4 turned = glm::translate(glm::dmat4(1), foot) *
-                            glm::rotate(glm::dmat4(1), angle, glm::dvec3(0, 1, 0)) *
-                            glm::translate(glm::dmat4(1), -foot) * glm::dmat4(camera.toWorld);
-  camera.toWorld = Mat4(turned);
+  const glm::dmat4 turn = glm::translate(glm::dmat4(1), foot) * glm::rotate(glm::dmat4(1), angle, glm::dvec3(0, 1, 0)) *
+                          glm::translate(glm::dmat4(1), -foot);
+  camera.toWorld = Mat4(turn * glm::dmat4(camera.toWorld));
+  for (Mat4& step : camera.steps) step = Mat4(turn * glm::dmat4(step));
 }
 
 }  // namespace braid

@@ -36,6 +36,7 @@ std::vector<StateOption> sceneIdentity(const SceneChoice& c, const SceneData& da
           {"--scene", std::to_string(c.frameScene)},
           {"--variant", c.load.variant},
           {"--frame-time", fmt::format("{}", c.frameTime)},
+          {"--shutter", fmt::format("{}", c.load.shutter)},
           {"--animation", c.load.animation},
           {"--double-sided", yesOrNo(c.load.doubleSided)},
           {"--default-light", toString(c.defaultLight)},

@@ -17,6 +17,7 @@ struct LoadOptions {
   std::optional<int> scene;        // index into scenes; none: the file's default, else 0
   std::string variant;             // KHR_materials_variants name; empty: none
   std::optional<float> frameTime;  // seconds into the animation; none: the rest pose
+  double shutter = 0;              // seconds for which things move from frameTime on; 0: they stand still
   std::string animation;           // the clip that frameTime is in, by name or index; empty: the first
   std::string camera;              // name or index of the camera that will look; empty: the first, "none": none
   DefaultLight defaultLight = DefaultLight::Studio;  // what a file without any light or emitter gets

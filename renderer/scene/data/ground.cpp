@@ -68,7 +68,7 @@ void addGround(SceneData& scene) {
   mesh.padForEmbree();
   mesh.material = static_cast<uint32_t>(scene.materials.size());
   scene.materials.push_back(paper);
-  scene.instances.push_back({static_cast<uint32_t>(scene.meshes.size()), Mat4(1)});
+  scene.instances.push_back({static_cast<uint32_t>(scene.meshes.size()), Mat4(1), {}});
   scene.meshes.push_back(std::move(mesh));
   matchBackdrop(scene);
 }

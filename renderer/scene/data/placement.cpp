@@ -50,12 +50,14 @@ glm::dmat3 axesOf(const glm::dmat4& transform) {
   return axes;
 }
 
-void transformMesh(TriangleMesh& mesh, const Mat4& toWorld) {
-  if (toWorld == Mat4(1)) return;
+namespace {
+
+bool mirrors(const Mat4& m) { return shapeOf(glm::dmat4(m)) == Shape::Solid && glm::determinant(Mat3(m)) < 0; }
+
+void transformVertices(MeshVertices& mesh, const Mat4& toWorld, bool mirrored) {
   const Mat3 linear(toWorld);
   const bool isFlat = shapeOf(glm::dmat4(toWorld)) != Shape::Solid;
   const Mat3 normalMatrix = isFlat ? cofactors(linear) : glm::transpose(glm::inverse(linear));
-  const bool mirrored = !isFlat && glm::determinant(linear) < 0;
   parallelChunks(mesh.positions.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) mesh.positions[i] = Vec3(toWorld * Vec4(mesh.positions[i], 1));
   });
@@ -72,8 +74,35 @@ void transformMesh(TriangleMesh& mesh, const Mat4& toWorld) {
       if (length > 0) t = Vec4(transformed / length, mirrored ? -t.w : t.w);
     }
   }
-  if (mirrored)
-    for (glm::uvec3& t : mesh.triangles) std::swap(t.y, t.z);
+}
+
+void turnWinding(TriangleMesh& mesh) {
+  for (glm::uvec3& t : mesh.triangles) std::swap(t.y, t.z);
+}
+
+}  // namespace
+
+void transformMesh(TriangleMesh& mesh, const Mat4& toWorld) {
+  if (toWorld == Mat4(1)) return;
+  const bool mirrored = mirrors(toWorld);
+  transformVertices(mesh, toWorld, mirrored);
+  if (mirrored) turnWinding(mesh);
+}
+
+void transformMesh(TriangleMesh& mesh, const Mat4& toWorld, const std::vector<Mat4>& steps) {
+  if (steps.empty()) {
+    const bool mirrored = mirrors(toWorld);
+    for (MeshVertices& step : mesh.steps) transformVertices(step, toWorld, mirrored);
+    return transformMesh(mesh, toWorld);
+  }
+  if (!mesh.moves()) mesh.steps.assign(steps.size(), mesh);
+  const auto solid =
+      std::find_if(steps.begin(), steps.end(), [](const Mat4& m) { return shapeOf(glm::dmat4(m)) == Shape::Solid; });
+  const bool decidedAtOnce = shapeOf(glm::dmat4(toWorld)) == Shape::Solid || solid == steps.end();
+  const bool mirrored = mirrors(decidedAtOnce ? toWorld : *solid);
+  transformVertices(mesh, toWorld, mirrored);
+  for (size_t k = 0; k < steps.size(); ++k) transformVertices(mesh.steps[k], steps[k], mirrored);
+  if (mirrored) turnWinding(mesh);
 }
 
 glm::dvec3 originFor(const SceneData& scene, const std::vector<glm::dmat4>& transforms, const glm::dvec3& suggestion) {
@@ -94,7 +123,8 @@ glm::dvec3 originFor(const SceneData& scene, const std::vector<glm::dmat4>& tran
   return isNear ? suggestion : bounds.centre();
 }
 
-void bringVerticesNear(SceneData& scene, std::vector<glm::dmat4>& transforms, const glm::dvec3& origin) {
+void bringVerticesNear(SceneData& scene, std::vector<glm::dmat4>& transforms,
+                       std::vector<std::vector<glm::dmat4>>& steps, const glm::dvec3& origin) {
   std::vector<std::vector<size_t>> placements(scene.meshes.size());
   for (size_t i = 0; i < scene.instances.size(); ++i) placements[scene.instances[i].mesh].push_back(i);
   for (size_t m = 0; m < scene.meshes.size(); ++m) {
@@ -106,7 +136,12 @@ void bringVerticesNear(SceneData& scene, std::vector<glm::dmat4>& transforms, co
     const glm::dvec3 shift =
         shapeOf(first) == Shape::Solid ? glm::dvec3(glm::inverse(first) * glm::dvec4(origin, 1)) : bounds.centre();
     for (Vec3& p : mesh.positions) p = Vec3(glm::dvec3(p) - shift);
-    for (const size_t i : placements[m]) transforms[i] = glm::translate(transforms[i], shift);
+    for (MeshVertices& step : mesh.steps)
+      for (Vec3& p : step.positions) p = Vec3(glm::dvec3(p) - shift);
+    for (const size_t i : placements[m]) {
+      transforms[i] = glm::translate(transforms[i], shift);
+      for (glm::dmat4& step : steps[i]) step = glm::translate(step, shift);
+    }
   }
 }
 

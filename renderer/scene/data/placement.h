@@ -28,6 +28,10 @@ glm::dmat3 axesOf(const glm::dmat4& transform);
 // pointing to the front.
 void transformMesh(TriangleMesh& mesh, const Mat4& toWorld);
 
+// The same with a transform for each of the `steps` after it: every step of the mesh gets its own. Whether it is
+// mirrored is decided by the first transform that leaves it solid; the front sides of others are theirs.
+void transformMesh(TriangleMesh& mesh, const Mat4& toWorld, const std::vector<Mat4>& steps);
+
 // Floats are too coarse for scenes that lie more than this many of their own radii from zero.
 inline constexpr double kFarInRadii = 64;
 
@@ -36,8 +40,9 @@ inline constexpr double kFarInRadii = 64;
 glm::dvec3 originFor(const SceneData& scene, const std::vector<glm::dmat4>& transforms, const glm::dvec3& suggestion);
 
 // Moves the vertices of meshes that lie far from their own zero to where `origin` is in their coordinates, and corrects
-// their transforms.
-void bringVerticesNear(SceneData& scene, std::vector<glm::dmat4>& transforms, const glm::dvec3& origin);
+// their transforms, those of `steps` too (of each instance at the steps of the scene's motion; empty: it stands still).
+void bringVerticesNear(SceneData& scene, std::vector<glm::dmat4>& transforms,
+                       std::vector<std::vector<glm::dmat4>>& steps, const glm::dvec3& origin);
 
 // The same transform with results relative to `origin`.
 inline Mat4 relativeTo(glm::dmat4 transform, const glm::dvec3& origin) {

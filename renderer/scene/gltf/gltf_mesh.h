@@ -10,7 +10,14 @@
 
 namespace braid::gltf {
 
-struct MeshJob {
+// What its vertices follow.
+struct MeshPose {
+  std::vector<float> weights;  // of the morph targets
+  // Joint to world times inverse bind, zero for joints that do not exist; null: not skinned.
+  std::shared_ptr<const std::vector<glm::dmat4>> joints;
+};
+
+struct MeshJob : MeshPose {
   const Primitive* primitive = nullptr;
   std::string place;  // JSON pointer of the primitive
   std::string name;
@@ -18,10 +25,8 @@ struct MeshJob {
   MaterialTable::Uvs uvs;
   bool needsTangents = false;
   bool keepAllAttributes = false;
-  std::vector<float> weights;  // of the morph targets
-  // Joint to world times inverse bind, zero for joints that do not exist; null: not skinned.
-  std::shared_ptr<const std::vector<glm::dmat4>> joints;
-  glm::dvec3 origin{0};  // taken from skinned positions
+  glm::dvec3 origin{0};         // taken from skinned positions
+  std::vector<MeshPose> later;  // at the steps 1, 2, … of the scene's motion; empty: it keeps its shape
 };
 
 // What a compressed mesh holds, with attributes by name.
@@ -40,6 +45,9 @@ std::optional<DracoMesh> decodeDraco(const Document& document, const MeshJob& jo
 
 // Thread-safe for distinct reports. An empty mesh if there is nothing to draw.
 TriangleMesh buildMesh(const Document& document, const MeshJob& job, Report& report);
+
+// The same at all steps of its motion. One whose triangles are others at another step stands still, with a warning.
+TriangleMesh buildMovingMesh(const Document& document, const MeshJob& job, Report& report);
 
 // Whether Draco holds its attributes.
 bool isPacked(const Primitive& primitive);

@@ -6,19 +6,13 @@
 
 #include "renderer/core/parallel.h"
 #include "renderer/scene/data/placement.h"
+#include "renderer/scene/gltf/gltf_cameras_lights.h"
+#include "renderer/scene/gltf/gltf_motion.h"
 #include "renderer/scene/gltf/gltf_variants.h"
 
 namespace braid::gltf {
 
 namespace {
-
-std::string nodePlace(int node) { return "/nodes/" + std::to_string(node); }
-
-// Embree ends the program at rays and transforms beyond 1.8e18: places keep away from that, as vertices do.
-bool isWithinReach(const glm::dmat4& m) {
-  const double* v = glm::value_ptr(m);
-  return std::all_of(v, v + 16, [](double x) { return std::abs(x) < 1e17; });
-}
 
 // What makes two uses of a primitive the same triangles.
 struct MeshKey {
@@ -40,25 +34,23 @@ struct GeometryKey {
 class SceneBuilder {
  public:
   SceneBuilder(Document& document, const LoadOptions& options, MaterialTable& materials, SceneData& scene)
-      : document_(document),
-        options_(options),
-        materials_(materials),
-        scene_(scene),
-        pose_(makePose(document, options)) {
+      : document_(document), options_(options), materials_(materials), scene_(scene), views_(document, scene) {
     variant_ = chosenVariant(document_, options_.variant);
     skins_.resize(document.model.skins.size());
   }
 
   void build() {
-    for (const int node : nodesOfScene()) {
-      addCamera(node);
-      if (!pose_.visible[static_cast<size_t>(node)]) continue;
-      addLight(node);
+    const std::vector<int> nodes = nodesOfScene();
+    poses_ = posesWhileOpen(document_, options_, shown(nodes));
+    scene_.motion = poses_.motion;
+    for (const int node : nodes) {
+      views_.addCamera(node, poses_);
+      if (!poses_.first.visible[static_cast<size_t>(node)]) continue;
+      views_.addLight(node, poses_);
       if (nodeAt(node).mesh >= 0) addMesh(node);
     }
     buildMeshes();
     placeAll();
-    useCamera();
   }
 
  private:
@@ -100,83 +92,38 @@ class SceneBuilder {
     return order;
   }
 
-  void addCamera(int index) {
-    const tinygltf::Node& node = nodeAt(index);
-    if (node.camera < 0) return;
-    CameraData camera = document_.cameras[static_cast<size_t>(node.camera)];
-    if (!node.name.empty()) camera.name = node.name;
-    if (camera.name.empty()) camera.name = "camera " + std::to_string(scene_.cameras.size());
-    // Scale does not apply to cameras: only where the node stands, its backward axis and which way is up.
-    const glm::dmat4& world = pose_.world[static_cast<size_t>(index)];
-    const glm::dmat3 axes = axesOf(world);
-    const glm::dvec3 back = axes[2], up = axes[1];
-    const glm::dvec3 side = glm::cross(up, back);
-    if (!(glm::length(side) > 1e-30) || !isWithinReach(world)) {
-      document_.report.warn(nodePlace(index),
-                            "a camera's node has a singular or endless transform; the camera is left out");
-      return;
+  // The nodes that the picture depends on.
+  std::vector<int> shown(const std::vector<int>& nodes) const {
+    std::vector<int> list;
+    std::vector<bool> hidden(document_.parents.size(), false);
+    size_t cameras = 0;
+    for (const int node : nodes) {
+      const tinygltf::Node& source = nodeAt(node);
+      const int parent = document_.parents[static_cast<size_t>(node)];
+      const bool unseen = !isVisible(source) || (parent >= 0 && hidden[static_cast<size_t>(parent)]);
+      hidden[static_cast<size_t>(node)] = unseen;
+      const bool camera = source.camera >= 0 && looks(options_.camera, cameraName(document_, node, cameras), cameras);
+      cameras += source.camera >= 0 ? 1 : 0;
+      const bool light = member(source.extensions, "KHR_lights_punctual").IsObject();
+      if (camera || (!unseen && (light || source.mesh >= 0))) list.push_back(node);
+      if (unseen || source.mesh < 0 || source.skin < 0) continue;
+      for (const int joint : document_.model.skins[static_cast<size_t>(source.skin)].joints)
+        if (joint >= 0) list.push_back(joint);
     }
-    const glm::dvec3 z = glm::normalize(back), x = glm::normalize(side);
-    cameras_.emplace_back(glm::dvec4(x, 0), glm::dvec4(glm::cross(z, x), 0), glm::dvec4(z, 0), world[3]);
-    scene_.cameras.push_back(std::move(camera));
-    cameraOf_.push_back(node.camera);
-  }
-
-  // Flaws matter only in the camera that looks.
-  void useCamera() {
-    for (size_t i = 0; i < cameraOf_.size(); ++i) {
-      const std::string& wanted = options_.camera;
-      if (wanted.empty() ? i == 0 : scene_.cameras[i].name == wanted || std::to_string(i) == wanted)
-        document_.usage.mark("cameras", cameraOf_[i]);
-    }
-  }
-
-  void addLight(int index) {
-    const tinygltf::Node& node = nodeAt(index);
-    const int source = gltf::index(member(node.extensions, "KHR_lights_punctual"), "light");
-    if (source < 0) return;
-    document_.usage.mark("lights", source);
-    PunctualLight light = document_.lights[static_cast<size_t>(source)];
-    if (!node.name.empty()) light.name = node.name;
-    const glm::dmat4& world = pose_.world[static_cast<size_t>(index)];
-    const bool isPoint = light.kind == PunctualKind::Point;
-    const glm::dvec3 direction = isPoint ? glm::dvec3(0, 0, -1) : -axesOf(world)[2];
-    if (!(glm::length(direction) > 1e-30) || !isWithinReach(world)) {
-      document_.report.warn(nodePlace(index),
-                            "a light's node has a singular or endless transform; the light is left out");
-      return;
-    }
-    lights_.emplace_back(world[3]);
-    light.direction = Vec3(glm::normalize(direction));
-    scene_.lights.push_back(std::move(light));
+    std::sort(list.begin(), list.end());
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+    return list;
   }
 
   void addMesh(int index) {
     const tinygltf::Node& node = nodeAt(index);
     document_.usage.mark("meshes", node.mesh);
-    std::vector<glm::dmat4> placed;
     if (firstMesh_ < 0) firstMesh_ = index;
     document_.usage.mark("skins", node.skin);
     // Without joints the mesh stays where its node is.
     const int skin =
         node.skin >= 0 && !document_.model.skins[static_cast<size_t>(node.skin)].joints.empty() ? node.skin : -1;
-    if (skin >= 0) {
-      placed.emplace_back(1);
-    } else {
-      const Attributes instancing = instancingOf(node);
-      for (const auto& [name, accessor] : instancing) document_.useAccessor(accessor);
-      budget(2 * instanceCount(document_, instancing) * sizeof(glm::dmat4));
-      for (const glm::dmat4& local : instanceTransforms(document_, instancing)) {
-        const glm::dmat4 toWorld = pose_.world[static_cast<size_t>(index)] * local;
-        if (shapeOf(toWorld) != Shape::Gone && isWithinReach(toWorld)) {
-          placed.emplace_back(toWorld);
-        } else {
-          document_.report.warn(
-              nodePlace(index),
-              "a mesh that its transform makes a line or a point (a scale of 0) or endless is left out");
-        }
-      }
-    }
+    const std::vector<Track> placed = skin >= 0 ? std::vector<Track>{{glm::dmat4(1)}} : placesOf(index);
     const tinygltf::Mesh& mesh = document_.model.meshes[static_cast<size_t>(node.mesh)];
     const std::string name = mesh.name.empty() ? "mesh " + std::to_string(node.mesh) : mesh.name;
     for (size_t p = 0; !placed.empty() && p < mesh.primitives.size(); ++p) {
@@ -184,15 +131,45 @@ class SceneBuilder {
       job.primitive = &mesh.primitives[p];
       job.place = "/meshes/" + std::to_string(node.mesh) + "/primitives/" + std::to_string(p);
       job.name = name + (mesh.primitives.size() > 1 ? "/" + std::to_string(p) : "");
-      const uint32_t number = placeJob(std::move(job), skin, pose_.weights[static_cast<size_t>(index)]);
-      budget(placed.size() * sizeof(MeshInstance));
-      for (const glm::dmat4& toWorld : placed) {
-        scene_.instances.push_back({number, Mat4(1)});
-        transforms_.push_back(toWorld);
-        // What is flattened cannot share its triangles.
-        if (shapeOf(toWorld) == Shape::Flat) budget(estimatedBytes(document_, mesh.primitives[p]));
+      const uint32_t number = placeJob(std::move(job), skin, index);
+      budget(placed.size() * placed.front().size() * sizeof(MeshInstance));
+      for (const Track& track : placed) {
+        scene_.instances.push_back({number, Mat4(1), {}});
+        transforms_.push_back(track.front());
+        steps_.emplace_back(track.begin() + 1, track.end());
+        // What is flattened cannot share its triangles, nor what changes its shape while it moves.
+        const bool solid =
+            std::all_of(track.begin(), track.end(), [](const glm::dmat4& m) { return shapeOf(m) == Shape::Solid; });
+        if (!solid || (track.size() > 1 && !jobs_[number].later.empty()))
+          budget(track.size() * estimatedBytes(document_, mesh.primitives[p]));
       }
     }
+  }
+
+  // Transforms to the world at all steps, or at the one of what stands still.
+  using Track = std::vector<glm::dmat4>;
+
+  // Where a node has its mesh, but for places in which there is nothing to be seen.
+  std::vector<Track> placesOf(int index) {
+    const Attributes instancing = instancingOf(nodeAt(index));
+    for (const auto& [attribute, accessor] : instancing) document_.useAccessor(accessor);
+    const size_t steps = poses_.moved(index) ? poses_.later.size() + 1 : 1;
+    budget((1 + steps) * instanceCount(document_, instancing) * sizeof(glm::dmat4));
+    std::vector<Track> places;
+    for (const glm::dmat4& local : instanceTransforms(document_, instancing)) {
+      Track track;
+      for (size_t k = 0; k < steps; ++k) track.push_back(poses_.step(k).world[static_cast<size_t>(index)] * local);
+      const bool seen =
+          std::any_of(track.begin(), track.end(), [](const glm::dmat4& m) { return shapeOf(m) != Shape::Gone; });
+      if (seen && std::all_of(track.begin(), track.end(), isWithinReach)) {
+        places.push_back(std::move(track));
+      } else {
+        document_.report.warn(
+            nodePlace(index),
+            "a mesh that its transform makes a line or a point (a scale of 0) or endless is left out");
+      }
+    }
+    return places;
   }
 
   const Primitive* representative(const Primitive& primitive) {
@@ -202,22 +179,36 @@ class SceneBuilder {
     return representatives_.emplace(std::move(key), &primitive).first->second;
   }
 
-  uint32_t placeJob(MeshJob job, int skin, const std::vector<float>& weights) {
+  uint32_t placeJob(MeshJob job, int skin, int node) {
     const Primitive& primitive = *job.primitive;
-    const bool isMorphed = !primitive.targets.empty();
-    MeshKey key{representative(primitive), skin, isMorphed ? weights : std::vector<float>()};
+    const auto i = static_cast<size_t>(node);
+    const bool morphs = !primitive.targets.empty() && poses_.morphed(node);
+    MeshKey key{representative(primitive), skin, {}};
+    if (!primitive.targets.empty()) key.weights = job.weights = poses_.first.weights[i];
+    for (size_t k = 0; morphs && k < poses_.later.size(); ++k) {
+      const std::vector<float>& weights = poses_.later[k].weights[i];
+      key.weights.insert(key.weights.end(), weights.begin(), weights.end());
+    }
     const auto [entry, isNew] = jobIndex_.emplace(std::move(key), static_cast<uint32_t>(jobs_.size()));
     if (!isNew) return entry->second;
-    budget(estimatedBytes(document_, primitive));
+    const bool changes = morphs || (skin >= 0 && moves(document_.model.skins[static_cast<size_t>(skin)]));
+    if (skin >= 0) job.joints = jointsOf(skin, 0);
+    for (size_t k = 1; changes && k <= poses_.later.size(); ++k)
+      job.later.push_back(
+          {morphs ? poses_.later[k - 1].weights[i] : job.weights, skin >= 0 ? jointsOf(skin, k) : nullptr});
+    budget((1 + job.later.size()) * estimatedBytes(document_, primitive));
     useData(primitive);
     job.material = materials_.use(materialOf(primitive));
     job.uvs = materials_.uvs(job.material);
     job.needsTangents = scene_.materials[job.material].needsTangents();
     job.keepAllAttributes = options_.keepAllAttributes;
-    job.weights = entry->first.weights;
-    if (skin >= 0) job.joints = jointsOf(skin);
     jobs_.push_back(std::move(job));
     return entry->second;
+  }
+
+  bool moves(const tinygltf::Skin& skin) const {
+    return std::any_of(skin.joints.begin(), skin.joints.end(),
+                       [&](int joint) { return joint >= 0 && poses_.moved(joint); });
   }
 
   void useData(const Primitive& primitive) {
@@ -239,12 +230,15 @@ class SceneBuilder {
     return primitive.material;
   }
 
-  std::shared_ptr<const std::vector<glm::dmat4>> jointsOf(int skin) {
-    std::shared_ptr<const std::vector<glm::dmat4>>& joints = skins_[static_cast<size_t>(skin)];
+  std::shared_ptr<const std::vector<glm::dmat4>> jointsOf(int skin, size_t step) {
+    auto& steps = skins_[static_cast<size_t>(skin)];
+    steps.resize(poses_.later.size() + 1);
     const tinygltf::Skin& source = document_.model.skins[static_cast<size_t>(skin)];
-    if (!joints) joints = std::make_shared<const std::vector<glm::dmat4>>(jointMatrices(document_, pose_, source));
+    if (!steps[step])
+      steps[step] =
+          std::make_shared<const std::vector<glm::dmat4>>(jointMatrices(document_, poses_.step(step), source));
     document_.useAccessor(source.inverseBindMatrices);
-    return joints;
+    return steps[step];
   }
 
   // A few bytes of JSON can ask for the same data over and over; real files stay far below this.
@@ -260,7 +254,7 @@ class SceneBuilder {
   void buildMeshes() {
     std::vector<TriangleMesh> built(jobs_.size());
     std::vector<Report> reports(jobs_.size());
-    parallelFor(jobs_.size(), [&](size_t i) { built[i] = buildMesh(document_, jobs_[i], reports[i]); });
+    parallelFor(jobs_.size(), [&](size_t i) { built[i] = buildMovingMesh(document_, jobs_[i], reports[i]); });
     for (const Report& report : reports) document_.report.append(report);
     // Points, lines and empty primitives leave no mesh.
     std::vector<uint32_t> placed(jobs_.size(), kNone);
@@ -275,10 +269,12 @@ class SceneBuilder {
       const uint32_t mesh = placed[scene_.instances[i].mesh];
       if (mesh == kNone) continue;
       scene_.instances[kept].mesh = mesh;
+      std::swap(steps_[kept], steps_[i]);
       transforms_[kept++] = transforms_[i];
     }
     scene_.instances.resize(kept);
     transforms_.resize(kept);
+    steps_.resize(kept);
   }
 
   // Up to here everything stands in the file's coordinates, as doubles.
@@ -287,17 +283,18 @@ class SceneBuilder {
     if (firstMesh_ >= 0) {
       auto node = static_cast<size_t>(firstMesh_);
       while (document_.parents[node] >= 0) node = static_cast<size_t>(document_.parents[node]);
-      root = glm::dvec3(pose_.world[node][3]);
+      root = glm::dvec3(poses_.first.world[node][3]);
     }
     scene_.origin = originFor(scene_, transforms_, root);
     if (scene_.origin != glm::dvec3(0)) {
       skinAnew();
-      bringVerticesNear(scene_, transforms_, scene_.origin);
+      bringVerticesNear(scene_, transforms_, steps_, scene_.origin);
     }
-    for (size_t i = 0; i < transforms_.size(); ++i)
+    for (size_t i = 0; i < transforms_.size(); ++i) {
       scene_.instances[i].toWorld = relativeTo(transforms_[i], scene_.origin);
-    for (size_t i = 0; i < cameras_.size(); ++i) scene_.cameras[i].toWorld = relativeTo(cameras_[i], scene_.origin);
-    for (size_t i = 0; i < lights_.size(); ++i) scene_.lights[i].position = Vec3(lights_[i] - scene_.origin);
+      for (const glm::dmat4& step : steps_[i]) scene_.instances[i].steps.push_back(relativeTo(step, scene_.origin));
+    }
+    views_.place();
   }
 
   // Skinned vertices are in the world already: they are computed again about the origin.
@@ -307,7 +304,7 @@ class SceneBuilder {
       if (!job.joints) return;
       job.origin = scene_.origin;
       Report told;
-      scene_.meshes[m] = buildMesh(document_, job, told);
+      scene_.meshes[m] = buildMovingMesh(document_, job, told);
     });
     for (size_t i = 0; i < transforms_.size(); ++i) {
       if (jobs_[jobOf_[scene_.instances[i].mesh]].joints)
@@ -319,15 +316,16 @@ class SceneBuilder {
   const LoadOptions& options_;
   MaterialTable& materials_;
   SceneData& scene_;
-  Pose pose_;
+  CamerasAndLights views_;
+  PoseSequence poses_;
   int variant_ = -1;
   uint64_t spent_ = 0;
-  int firstMesh_ = -1;                            // the first node that shows one
-  std::vector<glm::dmat4> transforms_, cameras_;  // of scene_.instances and scene_.cameras
-  std::vector<glm::dvec3> lights_;                // positions of scene_.lights
-  std::vector<size_t> jobOf_;                     // of scene_.meshes
-  std::vector<int> cameraOf_;                     // of the file, behind those of the scene
-  std::vector<std::shared_ptr<const std::vector<glm::dmat4>>> skins_;
+  int firstMesh_ = -1;                          // the first node that shows one
+  std::vector<glm::dmat4> transforms_;          // of scene_.instances
+  std::vector<std::vector<glm::dmat4>> steps_;  // the same at the later steps of those that move
+  std::vector<size_t> jobOf_;                   // of scene_.meshes
+  // Joint matrices of each skin at each step.
+  std::vector<std::vector<std::shared_ptr<const std::vector<glm::dmat4>>>> skins_;
   std::map<GeometryKey, const Primitive*> representatives_;
   std::map<MeshKey, uint32_t> jobIndex_;
   std::vector<MeshJob> jobs_;

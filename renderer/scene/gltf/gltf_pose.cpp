@@ -45,12 +45,13 @@ std::vector<float> morphWeights(const Document& document, const tinygltf::Node& 
   return {weights.begin(), weights.end()};
 }
 
+}  // namespace
+
 bool isVisible(const tinygltf::Node& node) {
   const Value& visible = member(member(node.extensions, "KHR_node_visibility"), "visible");
   return !visible.IsBool() || visible.Get<bool>();
 }
 
-// By name, else by index; the first if none is asked for; -1: the file has none.
 int chosenAnimation(const Document& document, const std::string& choice) {
   const std::vector<tinygltf::Animation>& all = document.model.animations;
   if (choice.empty()) return all.empty() ? -1 : 0;
@@ -65,8 +66,6 @@ int chosenAnimation(const Document& document, const std::string& choice) {
   throw SceneError(ExitCode::Usage, document.path, "/animations",
                    "no animation " + quoted(choice) + ": the file has " + (known.empty() ? "none" : known));
 }
-
-}  // namespace
 
 glm::dquat quaternion(const double* xyzw) {
   const glm::dquat q(xyzw[3], xyzw[0], xyzw[1], xyzw[2]);

@@ -15,9 +15,16 @@ struct Pose {
   std::vector<bool> visible;                // with all ancestors
 };
 
+// Whether a node itself is to be seen (KHR_node_visibility), its ancestors aside.
+bool isVisible(const tinygltf::Node& node);
+
 // Applies the chosen animation to the nodes of the document and multiplies transforms down the tree. Throws
 // SceneError(Usage) if it has no such animation.
 Pose makePose(Document& document, const LoadOptions& options);
+
+// The clip that is asked for, by name, else by index; the first if none is; -1: the file has none. Throws as
+// makePose().
+int chosenAnimation(const Document& document, const std::string& choice);
 
 // The quaternion of four numbers in glTF's order; 1 if it is zero.
 glm::dquat quaternion(const double* xyzw);

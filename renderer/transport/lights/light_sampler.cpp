@@ -9,13 +9,13 @@ namespace braid {
 
 namespace {
 
-LightBounds boundsOf(const EmissiveTriangle& e) {
+LightBounds boundsOf(const Scene& scene, const EmissiveTriangle& e) {
+  const Scene::Sweep sweep = scene.sweepOf(e);
   LightBounds b;
-  b.bounds.extend(e.p0);
-  b.bounds.extend(e.p0 + e.e1);
-  b.bounds.extend(e.p0 + e.e2);
+  b.bounds = sweep.bounds;
   b.axis = e.normal;
-  b.cosNormals = 1;
+  // Between two steps the normal of one that turns may leave the cone of both.
+  b.cosNormals = sweep.turns ? -1.0f : 1.0f;
   b.cosEmission = 0;
   b.power = e.power();
   b.twoSided = e.twoSided;
@@ -31,12 +31,17 @@ float punctualPower(const PunctualLight& light) {
 LightBounds boundsOf(const PunctualLight& light) {
   LightBounds b;
   b.bounds.extend(light.position);
+  bool turns = light.kind == PunctualKind::Point;
+  for (const LightPlace& step : light.steps) {
+    b.bounds.extend(step.position);
+    turns = turns || !(glm::dot(step.direction, light.direction) > 1 - 1e-6f);
+  }
   b.range = light.range;
   b.axis = light.direction;
   // A point light has normals everywhere; a spot only within its cone. Power as if the cone were a full sphere:
   // importance is per direction.
   b.power = 4 * kPi * average(light.intensity);
-  b.cosNormals = light.kind == PunctualKind::Point ? -1.0f : std::cos(light.outerConeAngle);
+  b.cosNormals = turns ? -1.0f : std::cos(light.outerConeAngle);
   b.cosEmission = light.kind == PunctualKind::Point ? 0.0f : std::cos(0.01f);
   return b;
 }
@@ -103,7 +108,7 @@ LightSampler::LightSampler(const Scene& scene, LightStrategy strategy) : scene_(
   if (hierarchy_) {
     std::vector<LightBounds> bounds;
     bounds.reserve(finite_);
-    for (const EmissiveTriangle& e : emitters) bounds.push_back(boundsOf(e));
+    for (const EmissiveTriangle& e : emitters) bounds.push_back(boundsOf(scene, e));
     for (uint32_t i : positional_) bounds.push_back(boundsOf(scene.lights()[i]));
     tree_.build(bounds);
   } else if (finite_ > 0) {
@@ -134,19 +139,18 @@ LightSampler::LightSampler(const Scene& scene, LightStrategy strategy) : scene_(
   }
 }
 
-bool LightSampler::sampleEmitter(const EmissiveTriangle& e, const Vec3& p, const Vec3& n, bool twoSided, Vec2 u,
-                                 LightSample& out) const {
+bool LightSampler::sampleEmitter(const EmissiveTriangle& e, const Receiver& at, Vec2 u, LightSample& out) const {
   const Vec2 b = squareToTriangle(u);
   const float b1 = b.x, b2 = b.y;
   const Vec3 point = e.p0 + b1 * e.e1 + b2 * e.e2;
-  const Vec3 d = point - p;
+  const Vec3 d = point - at.position;
   const float distance2 = glm::dot(d, d);
   if (!(distance2 > 0)) return false;
   float cosLight = -glm::dot(d, e.normal);
   if (e.twoSided) cosLight = std::abs(cosLight);
   if (!(cosLight > 0)) return false;
   // The receiver's side first: half of all samples end here, before the square root.
-  if (!twoSided && !(glm::dot(d, n) > 0)) return false;
+  if (!at.twoSided && !(glm::dot(d, at.normal) > 0)) return false;
   out.distance = std::sqrt(distance2);
   const float inverse = 1 / out.distance;
   out.wi = d * inverse;
@@ -157,29 +161,31 @@ bool LightSampler::sampleEmitter(const EmissiveTriangle& e, const Vec3& p, const
   return out.pdfW > 0 && std::isfinite(out.pdfW);
 }
 
-bool LightSampler::samplePunctual(const PunctualLight& light, const Vec3& p, LightSample& out) const {
-  const Vec3 d = light.position - p;
+bool LightSampler::samplePunctual(const PunctualLight& light, const Receiver& at, LightSample& out) const {
+  const LightPlace place = placeAt(light, at.time);
+  const Vec3 d = place.position - at.position;
   const float distance2 = glm::dot(d, d);
   if (!(distance2 > 0)) return false;
   out.distance = std::sqrt(distance2);
   out.wi = d / out.distance;
   out.radiance = light.intensity / distance2 * rangeWindow(light, out.distance);
-  if (light.kind == PunctualKind::Spot) out.radiance *= spotFalloff(light, -glm::dot(out.wi, light.direction));
+  if (light.kind == PunctualKind::Spot) out.radiance *= spotFalloff(light, -glm::dot(out.wi, place.direction));
   out.pdfW = 1;
   out.delta = true;
   return !isBlack(out.radiance) && isFinite(out.radiance);
 }
 
-bool LightSampler::sample(const Vec3& p, const Vec3& n, bool twoSided, float uSelect, Vec2 u, LightSample& out) const {
+bool LightSampler::sample(const Receiver& at, float uSelect, Vec2 u, LightSample& out) const {
   if (uSelect < probabilityFinite_) {
     float select = std::min(uSelect / probabilityFinite_, kOneMinusEpsilon), probability = 0;
-    const size_t light =
-        hierarchy_ ? tree_.sample(p, n, twoSided, select, probability) : pick(cumulative_, select, probability);
+    const size_t light = hierarchy_ ? tree_.sample(at.position, at.normal, at.twoSided, select, probability)
+                                    : pick(cumulative_, select, probability);
     if (!(probability > 0)) return false;
     out.light = static_cast<uint32_t>(light);
     const size_t emitters = scene_.emitters().size();
-    const bool ok = light < emitters ? sampleEmitter(scene_.emitters()[light], p, n, twoSided, u, out)
-                                     : samplePunctual(scene_.lights()[positional_[light - emitters]], p, out);
+    EmissiveTriangle moved;
+    const bool ok = light < emitters ? sampleEmitter(scene_.emitterAt(light, at.time, moved), at, u, out)
+                                     : samplePunctual(scene_.lights()[positional_[light - emitters]], at, out);
     out.pdfW *= probability * probabilityFinite_;
     return ok && out.pdfW > 0;
   }
@@ -189,7 +195,7 @@ bool LightSampler::sample(const Vec3& p, const Vec3& n, bool twoSided, float uSe
     const size_t index = pick(directionalCumulative_, select, probability);
     const PunctualLight& light = scene_.lights()[directional_[index]];
     out.light = firstDirectional() + static_cast<uint32_t>(index);
-    out.wi = -light.direction;
+    out.wi = -placeAt(light, at.time).direction;
     out.distance = kInfinity;
     out.radiance = light.intensity;
     out.pdfW = probability * probabilityDirectional_;
@@ -206,25 +212,30 @@ bool LightSampler::sample(const Vec3& p, const Vec3& n, bool twoSided, float uSe
   return true;
 }
 
-float LightSampler::finiteProbability(const Vec3& p, const Vec3& n, bool twoSided, size_t light) const {
-  if (hierarchy_) return tree_.empty() ? 0 : tree_.probability(p, n, twoSided, static_cast<uint32_t>(light));
+float LightSampler::finiteProbability(const Receiver& at, size_t light) const {
+  if (hierarchy_)
+    return tree_.empty() ? 0 : tree_.probability(at.position, at.normal, at.twoSided, static_cast<uint32_t>(light));
   return cumulative_[light + 1] - cumulative_[light];
 }
 
-float LightSampler::pdfEmitter(const Vec3& p, const Vec3& n, bool twoSided, size_t index, float distance,
-                               float cosLight) const {
+float LightSampler::areaOf(size_t emitter, float time) const {
+  EmissiveTriangle moved;
+  return scene_.emitterAt(emitter, time, moved).area;
+}
+
+float LightSampler::pdfEmitter(const Receiver& at, size_t index, float distance, float cosLight) const {
   if (probabilityFinite_ == 0) return 0;
-  const float pdf = sqr(distance) / (cosLight * scene_.emitters()[index].area);
-  const float choice = finiteProbability(p, n, twoSided, index) * probabilityFinite_;
+  const float pdf = sqr(distance) / (cosLight * areaOf(index, at.time));
+  const float choice = finiteProbability(at, index) * probabilityFinite_;
   const float result = choice * pdf;
   return std::isfinite(result) ? result : 0.0f;
 }
 
-float LightSampler::pdfDirect(uint32_t light, const Vec3& p, const Vec3& n, bool twoSided, const Vec3& toLight) const {
+float LightSampler::pdfDirect(uint32_t light, const Receiver& at, const Vec3& toLight) const {
   if (light < finite_) {
     if (probabilityFinite_ == 0) return 0;
-    const float choice = finiteProbability(p, n, twoSided, light) * probabilityFinite_;
-    return light < firstPositional() ? choice / scene_.emitters()[light].area : choice;
+    const float choice = finiteProbability(at, light) * probabilityFinite_;
+    return light < firstPositional() ? choice / areaOf(light, at.time) : choice;
   }
   if (light < environmentLight()) {
     const size_t i = light - finite_;

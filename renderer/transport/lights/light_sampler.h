@@ -22,6 +22,14 @@ struct LightSample {
   uint32_t light = 0;  // number of the light, see LightSampler::size()
 };
 
+// A point that light may reach, at the time of its path.
+struct Receiver {
+  Vec3 position;
+  Vec3 normal;            // of shading; not zero unless twoSided
+  bool twoSided = false;  // the surface transmits
+  float time = 0;
+};
+
 // How finite lights are chosen.
 enum class LightStrategy { Automatic, Power, Hierarchy };
 
@@ -34,18 +42,17 @@ class LightSampler {
   // Automatic: see hierarchyPays().
   LightSampler(const Scene& scene, LightStrategy strategy);
 
-  // Samples a light for the point p with shading normal n (not zero unless twoSided); `twoSided`: the surface
-  // transmits. False: no light can contribute.
-  bool sample(const Vec3& p, const Vec3& n, bool twoSided, float uSelect, Vec2 u, LightSample& out) const;
+  // Samples a light for a point. False: no light can contribute.
+  bool sample(const Receiver& at, float uSelect, Vec2 u, LightSample& out) const;
 
   // Density with which sample() would pick the direction to a point hit on emitter `index` (distance in metres, cosine
   // at the light > 0).
-  float pdfEmitter(const Vec3& p, const Vec3& n, bool twoSided, size_t index, float distance, float cosLight) const;
+  float pdfEmitter(const Receiver& at, size_t index, float distance, float cosLight) const;
   float pdfEnvironment(const Vec3& direction) const;
 
   // Density with which sample() at a receiver picks a point of a light: per m² for emissive triangles, per solid angle
   // about `toLight` for the environment, a probability for the others.
-  float pdfDirect(uint32_t light, const Vec3& p, const Vec3& n, bool twoSided, const Vec3& toLight) const;
+  float pdfDirect(uint32_t light, const Receiver& at, const Vec3& toLight) const;
 
   // Lights in all, and where each kind begins in the numbering.
   uint32_t size() const { return environmentLight() + (scene_.environment() ? 1u : 0u); }
@@ -64,10 +71,10 @@ class LightSampler {
   size_t bytes() const { return tree_.bytes() + cumulative_.size() * sizeof(float); }
 
  private:
-  bool sampleEmitter(const EmissiveTriangle& e, const Vec3& p, const Vec3& n, bool twoSided, Vec2 u,
-                     LightSample& out) const;
-  bool samplePunctual(const PunctualLight& light, const Vec3& p, LightSample& out) const;
-  float finiteProbability(const Vec3& p, const Vec3& n, bool twoSided, size_t light) const;
+  bool sampleEmitter(const EmissiveTriangle& e, const Receiver& at, Vec2 u, LightSample& out) const;
+  bool samplePunctual(const PunctualLight& light, const Receiver& at, LightSample& out) const;
+  float finiteProbability(const Receiver& at, size_t light) const;
+  float areaOf(size_t emitter, float time) const;
 
   const Scene& scene_;
   size_t finite_ = 0;
