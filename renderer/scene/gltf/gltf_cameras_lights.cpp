@@ -63,8 +63,7 @@ void CamerasAndLights::addCamera(int index, const PoseSequence& poses) {
     return;
   }
   // Flaws matter only in the camera that looks.
-  if (looks(document_.options.camera, camera.name, scene_.cameras.size()))
-    document_.usage.mark("cameras", node.camera);
+  if (looks(document_.options.camera, camera.name, scene_.cameras.size())) document_.usage.mark("cameras", node.camera);
   std::vector<glm::dmat4>& steps = cameras_.emplace_back();
   steps.push_back(*at);
   forLaterSteps(poses, index,

@@ -155,16 +155,14 @@ class Steps {
 // the closing itself belongs to no path.
 std::vector<Candidate> momentsAfter(const Document& document, int clip, float opening, double seconds) {
   const auto closing = static_cast<float>(static_cast<double>(opening) + seconds);
-  const size_t most = std::clamp<size_t>(kMostPlaces / std::max<size_t>(document.model.nodes.size(), 1), 3,
-                                         kEven + 2 * kMostKeys);
+  const size_t most =
+      std::clamp<size_t>(kMostPlaces / std::max<size_t>(document.model.nodes.size(), 1), 3, kEven + 2 * kMostKeys);
   const size_t even = std::min(kEven, most);
   std::vector<Candidate> moments;
   const auto add = [&](float time, double share) {
     if (time > opening && time < closing) moments.push_back({time, std::clamp(share, 0.0, 1.0), {}});
   };
-  const auto shareOf = [&](float time) {
-    return (static_cast<double>(time) - static_cast<double>(opening)) / seconds;
-  };
+  const auto shareOf = [&](float time) { return (static_cast<double>(time) - static_cast<double>(opening)) / seconds; };
   std::vector<float> keys = keyTimes(document, clip, opening, closing);
   const size_t kept = std::min(keys.size(), (most - even) / 2);
   for (size_t i = 0; i < kept; ++i) {
@@ -173,11 +171,13 @@ std::vector<Candidate> momentsAfter(const Document& document, int clip, float op
     add(key, shareOf(key));
   }
   for (size_t i = 1; i < even; ++i) {
-    const auto time = static_cast<float>(static_cast<double>(opening) + seconds * static_cast<double>(i) / static_cast<double>(even));
+    const auto time =
+        static_cast<float>(static_cast<double>(opening) + seconds * static_cast<double>(i) / static_cast<double>(even));
     if (!std::binary_search(keys.begin(), keys.end(), time)) add(time, shareOf(time));
   }
   add(std::nextafter(closing, opening), 1);
-  std::stable_sort(moments.begin(), moments.end(), [](const Candidate& a, const Candidate& b) { return a.time < b.time; });
+  std::stable_sort(moments.begin(), moments.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.time < b.time; });
   moments.erase(std::unique(moments.begin(), moments.end(),
                             [](const Candidate& a, const Candidate& b) { return a.time == b.time; }),
                 moments.end());

@@ -9,15 +9,15 @@
 
 namespace braid::gltf {
 
-// Straight pieces at most: a full turn is then off by 1/208 of its radius.
+// Straight pieces at most: a full turn is then off by 1/52 of its radius.
 inline constexpr size_t kMostPieces = 16;
 
 struct PoseSequence {
-  Pose first;                      // at the opening
-  std::vector<Pose> later;         // at the steps 1, 2, …; empty: nothing moves
-  SceneMotion motion;              // the times of all steps
-  std::vector<bool> moves;         // by node; empty: none does
-  std::vector<bool> morphs;        // by node: the weights of its targets change
+  Pose first;                // at the opening
+  std::vector<Pose> later;   // at the steps 1, 2, …; empty: nothing moves
+  SceneMotion motion;        // the times of all steps
+  std::vector<bool> moves;   // by node; empty: none does
+  std::vector<bool> morphs;  // by node: the weights of its targets change
   bool moved(int node) const { return !moves.empty() && moves[static_cast<size_t>(node)]; }
   bool morphed(int node) const { return !morphs.empty() && morphs[static_cast<size_t>(node)]; }
   const Pose& step(size_t k) const { return k == 0 ? first : later[k - 1]; }
