@@ -9,7 +9,7 @@
 
 namespace braid::gltf {
 
-// Straight pieces at most: a full turn is then off by 1/208 of its radius.
+// Straight pieces at most: a full turn is then off by 1/52 of its radius.
 inline constexpr size_t kMostPieces = 16;
 
 struct PoseSequence {

@@ -102,11 +102,12 @@ TEST_CASE("--shutter: frames, resumed and merged renders are those of one run; a
     must(folder, view + "--frame-time 0.5 --spp 4 --checkpoint s.state --overwrite -o part.exr");
     must(folder, view + "--frame-time 0.5 --spp 8 --resume s.state -o resumed.exr");
     CHECK(bytes(folder, "whole.exr") == bytes(folder, "resumed.exr"));
-    must(folder, view + "--frame-time 0.5 --passes 0:4 --checkpoint a.state");
-    must(folder, view + "--frame-time 0.5 --passes 4:8 --checkpoint b.state");
+    must(folder, view + "--frame-time 0.5 --passes 0:4 --checkpoint a.state --overwrite");
+    must(folder, view + "--frame-time 0.5 --passes 4:8 --checkpoint b.state --overwrite");
     must(folder, "merge a.state b.state -o merged.exr -q");
     must(folder, "compare merged.exr whole.exr --metric relL2 --max 1e-9");
-    must(folder, "render " + kView + name + " --shutter 0.3 --frame-time 0.5 --passes 4:8 --checkpoint c.state");
+    must(folder,
+         "render " + kView + name + " --shutter 0.3 --frame-time 0.5 --passes 4:8 --checkpoint c.state --overwrite");
     const Run refused = braidRun(folder, "merge a.state c.state -o no.exr");
     CHECK(refused.code != 0);
     CHECK(contains(refused.err, "--shutter"));
