@@ -128,7 +128,8 @@ TEST_CASE("Shutter: the mean of stills at even times is the picture of the open 
     }
     for (MeshInstance& i : data.instances) {
       if (i.steps.empty()) continue;
-      i.toWorld = time < 0.5f ? between(i.toWorld, i.steps[0], 2 * time) : between(i.steps[0], i.steps[1], 2 * time - 1);
+      i.toWorld =
+          time < 0.5f ? between(i.toWorld, i.steps[0], 2 * time) : between(i.steps[0], i.steps[1], 2 * time - 1);
       i.steps.clear();
     }
     const LightPlace place = placeAt(data.lights[0], time);
