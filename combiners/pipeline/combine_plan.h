@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "combiners/method.h"
+#include "combiners/pipeline/available_estimates.h"
 
 namespace braid {
 
@@ -24,30 +25,6 @@ struct CombinePlanOptions {
   bool helpers = true;                 // whether methods get their helpers (Needs::helper)
   uint64_t stop = 0;                   // passes after which methods that can stop denoising do; 0: never
 };
-
-// What is known of an estimate without its pixels.
-struct AvailableEstimate {
-  std::string name;
-  bool unbiased = true;
-  Correlation correlation = Correlation::Independent;
-  uint64_t passes = 0;  // 0: not known
-  bool halves = true, variance = true, quarters = false;
-  int checkpoints = 0;
-  std::vector<uint64_t> kept{};  // passes of the checkpoints with their image, rising
-  bool bias = false;             // whether there is an estimate of it
-  bool directIndirect = false;   // whether direct light is known by itself
-};
-
-struct AvailableEstimates {
-  std::vector<AvailableEstimate> estimates;
-  bool features = false;
-  bool reference = false;
-  const AvailableEstimate* find(const std::string& name) const;
-};
-AvailableEstimates availableIn(const Estimates& estimates);
-
-// The estimate in the role of the unbiased one where no user names it; empty: there is none.
-std::string defaultUnbiased(const AvailableEstimates& available);
 
 // One method and its inputs, by name; empty: not used.
 struct Step {

@@ -6,7 +6,7 @@
 #include <doctest/doctest.h>
 
 #include "renderer/core/sampler.h"
-#include "tests/support/chi_squared.h"
+#include "tests/support/statistics/chi_squared.h"
 #include "tests/support/render_fixture.h"
 
 namespace braid::test_sampler {

@@ -17,7 +17,7 @@
 #include "renderer/core/hash.h"
 #include "renderer/film/files/state_file.h"
 #include "renderer/scene/data/gltf.h"
-#include "renderer/scene/data/texture.h"
+#include "renderer/scene/data/textures/texture.h"
 #include "tools/images/estimates_file.h"
 
 namespace braid::fuzz {

@@ -8,7 +8,7 @@
 #include "integrators/light_preparation.h"
 #include "integrators/bidirectional/strategies.h"
 #include "renderer/scene/data/gltf.h"
-#include "tests/support/calibration.h"
+#include "tests/support/statistics/calibration.h"
 
 namespace braid::test_bdpt {
 

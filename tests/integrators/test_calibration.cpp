@@ -2,7 +2,7 @@
 // The reported variance of path tracing, and of its direct and indirect light; how it is measured: calibration.h.
 #include "combiners/statistics/direct_indirect.h"
 #include "renderer/scene/data/gltf.h"
-#include "tests/support/calibration.h"
+#include "tests/support/statistics/calibration.h"
 
 namespace braid::test_calibration {
 

@@ -6,7 +6,7 @@
 #include <doctest/doctest.h>
 
 #include "renderer/scene/data/gltf.h"
-#include "tests/support/pass_means.h"
+#include "tests/support/statistics/pass_means.h"
 
 namespace braid::test_crn {
 

@@ -8,7 +8,7 @@
 #include "integrators/gdpt/gdpt_kernel.h"
 #include "integrators/gdpt/gdpt_poisson.h"
 #include "renderer/scene/data/gltf.h"
-#include "tests/support/pass_means.h"
+#include "tests/support/statistics/pass_means.h"
 
 namespace braid::test_gdpt {
 

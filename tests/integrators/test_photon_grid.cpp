@@ -10,7 +10,7 @@
 #include <tbb/task_arena.h>
 
 #include "integrators/sppm/photon_grid.h"
-#include "tests/support/chi_squared.h"
+#include "tests/support/statistics/chi_squared.h"
 
 namespace braid::test_photon_grid {
 

@@ -8,7 +8,7 @@
 #include "renderer/scene/data/gltf.h"
 #include "renderer/session/session.h"
 #include "tests/integrators/small_renders.h"
-#include "tests/support/chi_squared.h"
+#include "tests/support/statistics/chi_squared.h"
 #include "tools/bench/builtin_scenes.h"
 
 namespace braid::test_registry_images {

@@ -3,7 +3,7 @@
 #include <doctest/doctest.h>
 
 #include "tests/support/moving_scenes.h"
-#include "tests/support/pass_means.h"
+#include "tests/support/statistics/pass_means.h"
 
 namespace braid::test_shutter {
 

@@ -6,7 +6,7 @@
 
 #include "integrators/bidirectional/merge_grid.h"
 #include "renderer/scene/data/gltf.h"
-#include "tests/support/calibration.h"
+#include "tests/support/statistics/calibration.h"
 
 namespace braid::test_vcm {
 

@@ -4,7 +4,7 @@
 
 #include "renderer/transport/hit.h"
 #include "tests/support/counts.h"
-#include "tests/support/pass_means.h"
+#include "tests/support/statistics/pass_means.h"
 
 namespace braid::test_coincident {
 

@@ -5,7 +5,7 @@
 #include "renderer/film/files/exr.h"
 #include "tests/support/command_line.h"
 #include "tests/support/gltf_fixture.h"
-#include "tests/support/pass_means.h"
+#include "tests/support/statistics/pass_means.h"
 
 namespace braid::test_far_scene {
 

@@ -4,7 +4,7 @@
 
 #include "renderer/transport/hit.h"
 #include "tests/scene/scene_shapes.h"
-#include "tests/support/chi_squared.h"
+#include "tests/support/statistics/chi_squared.h"
 #include "tools/bench/builtin_scenes.h"
 
 namespace braid::test_scene_build_rays {

@@ -154,7 +154,7 @@ TEST_CASE("Studio: the camera sees the backdrop, mirrors see the studio, --backg
   data.materials.push_back(mirror);
   addMesh(data, quad({-4, 9, -4}, {8, 0, 0}, {0, 0, 8}), 1);  // reflects the nadir's paper past the small floor
   data.meshes.erase(data.meshes.begin(), data.meshes.begin() + 2);
-  data.instances = {{0, Mat4(1)}};
+  data.instances = {{0, Mat4(1), {}}};
   settings.spp = 16;
   const float seen = render(data, settings).image[1].at(4, 4);
   const Environment studio(*data.environment);

@@ -5,7 +5,7 @@
 
 #include <doctest/doctest.h>
 
-#include "renderer/scene/data/texture.h"
+#include "renderer/scene/data/textures/texture.h"
 
 namespace braid::test_texture {
 

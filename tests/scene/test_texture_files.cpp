@@ -12,7 +12,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/film/files/exr.h"
-#include "renderer/scene/data/texture.h"
+#include "renderer/scene/data/textures/texture.h"
 #include "tests/support/ktx2_writer.h"
 
 namespace braid::test_texture_files {

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "tests/support/chi_squared.h"
+#include "tests/support/statistics/chi_squared.h"
 
 namespace braid::test {
 

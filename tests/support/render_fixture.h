@@ -13,7 +13,7 @@
 
 #include "integrators/registry.h"
 #include "renderer/session/session.h"
-#include "tests/support/chi_squared.h"
+#include "tests/support/statistics/chi_squared.h"
 #include "tools/bench/builtin_scenes.h"
 
 namespace braid::test {

@@ -5,7 +5,7 @@
 
 #include "renderer/transport/bsdf/bsdf.h"
 #include "tests/support/bsdf_cases.h"
-#include "tests/support/chi_squared.h"
+#include "tests/support/statistics/chi_squared.h"
 
 namespace braid::test_bsdf_chi2 {
 

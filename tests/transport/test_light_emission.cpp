@@ -6,7 +6,7 @@
 
 #include "renderer/transport/light_emission.h"
 #include "renderer/transport/light_reach.h"
-#include "tests/support/chi_squared.h"
+#include "tests/support/statistics/chi_squared.h"
 #include "tests/support/render_fixture.h"
 
 namespace braid::test_light_emission {

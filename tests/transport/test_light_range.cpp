@@ -3,7 +3,7 @@
 #include <doctest/doctest.h>
 
 #include "renderer/transport/lights/light_sampler.h"
-#include "tests/support/pass_means.h"
+#include "tests/support/statistics/pass_means.h"
 
 namespace braid::test_light_range {
 

@@ -8,7 +8,7 @@
 
 #include "renderer/transport/bsdf/bsdf.h"
 #include "tests/support/bsdf_cases.h"
-#include "tests/support/chi_squared.h"
+#include "tests/support/statistics/chi_squared.h"
 
 namespace braid::test_lobe_groups {
 

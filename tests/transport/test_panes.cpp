@@ -5,7 +5,7 @@
 #include <doctest/doctest.h>
 
 #include "tests/support/bsdf_cases.h"
-#include "tests/support/pass_means.h"
+#include "tests/support/statistics/pass_means.h"
 #include "tests/transport/panes.h"
 
 namespace braid::test_panes {

@@ -4,7 +4,7 @@
 #include <doctest/doctest.h>
 
 #include "renderer/transport/bsdf/warp.h"
-#include "tests/support/chi_squared.h"
+#include "tests/support/statistics/chi_squared.h"
 
 namespace braid::test_warp {
 

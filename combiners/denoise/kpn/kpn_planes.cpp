@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "combiners/pixels/box_mean.h"
-#include "combiners/statistics/mean_depth.h"
+#include "combiners/pixels/mean_depth.h"
 #include "renderer/core/parallel.h"
 #include "renderer/core/vec.h"
 

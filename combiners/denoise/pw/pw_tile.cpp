@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "combiners/statistics/mean_depth.h"
+#include "combiners/pixels/mean_depth.h"
 #include "combiners/statistics/variance.h"
 #include "renderer/core/error.h"
 

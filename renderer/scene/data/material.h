@@ -6,7 +6,7 @@
 #include <string>
 
 #include "renderer/core/vec.h"
-#include "renderer/scene/data/texture.h"
+#include "renderer/scene/data/textures/texture.h"
 
 namespace braid {
 

@@ -9,7 +9,7 @@
 
 #include "renderer/core/vec.h"
 #include "renderer/scene/data/material.h"
-#include "renderer/scene/data/texture.h"
+#include "renderer/scene/data/textures/texture.h"
 
 namespace braid {
 

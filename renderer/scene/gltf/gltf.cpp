@@ -8,7 +8,7 @@
 #include "renderer/scene/gltf/document/gltf_document.h"
 #include "renderer/scene/gltf/gltf_material.h"
 #include "renderer/scene/gltf/gltf_nodes.h"
-#include "renderer/scene/gltf/gltf_pose.h"
+#include "renderer/scene/gltf/poses/gltf_pose.h"
 #include "renderer/scene/data/scene_defaults.h"
 
 namespace braid {

@@ -6,8 +6,8 @@
 
 #include "renderer/core/parallel.h"
 #include "renderer/scene/data/placement.h"
-#include "renderer/scene/gltf/gltf_cameras_lights.h"
-#include "renderer/scene/gltf/gltf_motion.h"
+#include "renderer/scene/gltf/poses/gltf_cameras_lights.h"
+#include "renderer/scene/gltf/poses/gltf_motion.h"
 #include "renderer/scene/gltf/gltf_variants.h"
 
 namespace braid::gltf {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "renderer/scene/gltf/gltf_mesh.h"
-#include "renderer/scene/gltf/gltf_pose.h"
+#include "renderer/scene/gltf/poses/gltf_pose.h"
 
 namespace braid::gltf {
 

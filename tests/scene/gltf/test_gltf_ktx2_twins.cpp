@@ -10,7 +10,7 @@
 #include <zlib.h>
 
 #include "braid/braid.h"
-#include "renderer/scene/data/texture.h"
+#include "renderer/scene/data/textures/texture.h"
 #include "tests/support/basis_lz_writer.h"
 #include "tests/support/gltf_fixture.h"
 

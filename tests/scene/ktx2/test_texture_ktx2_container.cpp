@@ -12,7 +12,7 @@
 #include <zstd.h>
 
 #include "renderer/scene/data/ktx2/ktx2.h"
-#include "renderer/scene/data/ktx2_image.h"
+#include "renderer/scene/data/textures/ktx2_image.h"
 #include "tests/support/ktx2_writer.h"
 
 namespace braid::test_texture_ktx2_container {

@@ -37,4 +37,8 @@ bool isKtx2(Bytes data);
 // data that cannot be read are passed over.
 Container readContainer(Bytes file);
 
+// The first `bytes` bytes of what a level holds, by libzstd or zlib; what follows them is not unpacked. Refuses data
+// that hold less. Nothing is allocated beyond that and the window of the compression, at most 128 MiB.
+std::vector<uint8_t> inflate(Supercompression scheme, Bytes level, size_t bytes);
+
 }  // namespace braid::ktx2

@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "renderer/scene/data/ktx2/bit_reader.h"
+#include "renderer/scene/data/ktx2/bytes.h"
 
 namespace braid::ktx2 {
 

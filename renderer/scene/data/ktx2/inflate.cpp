@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "renderer/scene/data/ktx2/inflate.h"
+#include "renderer/scene/data/ktx2/container.h"
 
 #include <algorithm>
 #include <limits>

@@ -8,7 +8,6 @@
 #include "renderer/core/image_limits.h"
 #include "renderer/core/parallel.h"
 #include "renderer/scene/data/ktx2/etc1s.h"
-#include "renderer/scene/data/ktx2/inflate.h"
 #include "renderer/scene/data/ktx2/plain.h"
 #include "renderer/scene/data/ktx2/uastc.h"
 

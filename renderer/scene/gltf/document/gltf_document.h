@@ -22,7 +22,7 @@
 
 #include "renderer/core/hash.h"
 #include "renderer/scene/data/gltf.h"
-#include "renderer/scene/data/ktx2_image.h"
+#include "renderer/scene/data/textures/ktx2_image.h"
 #include "renderer/scene/gltf/document/gltf_files.h"
 #include "renderer/scene/gltf/document/gltf_report.h"
 #include "renderer/scene/data/scene_data.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "renderer/scene/gltf/gltf_motion.h"
+#include "renderer/scene/gltf/poses/gltf_motion.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "renderer/scene/data/ktx2_image.h"
+#include "renderer/scene/data/textures/ktx2_image.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "renderer/scene/data/image_checks.h"
+#include "renderer/scene/data/textures/image_checks.h"
 #include "renderer/scene/data/ktx2/ktx2.h"
 
 namespace braid {

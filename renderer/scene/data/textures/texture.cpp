@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "renderer/scene/data/texture.h"
+#include "renderer/scene/data/textures/texture.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,9 +11,9 @@
 
 #include "renderer/core/error.h"
 #include "renderer/images/image_codecs.h"
-#include "renderer/scene/data/image_checks.h"
-#include "renderer/scene/data/ktx2_image.h"
-#include "renderer/scene/data/webp.h"
+#include "renderer/scene/data/textures/image_checks.h"
+#include "renderer/scene/data/textures/ktx2_image.h"
+#include "renderer/scene/data/textures/webp.h"
 
 namespace braid {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "renderer/scene/gltf/gltf_pose.h"
+#include "renderer/scene/gltf/poses/gltf_pose.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "renderer/scene/gltf/gltf_motion.h"
+#include "renderer/scene/gltf/poses/gltf_motion.h"
 
 namespace braid::gltf {
 

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "renderer/scene/data/texture.h"
+#include "renderer/scene/data/textures/texture.h"
 
 namespace braid {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "renderer/scene/data/webp.h"
+#include "renderer/scene/data/textures/webp.h"
 
 #include <cstring>
 
@@ -7,7 +7,7 @@
 #include <webp/demux.h>
 
 #include "renderer/core/error.h"
-#include "renderer/scene/data/image_checks.h"
+#include "renderer/scene/data/textures/image_checks.h"
 
 namespace braid {
 

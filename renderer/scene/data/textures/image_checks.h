@@ -2,7 +2,7 @@
 // What images of files may hold.
 #pragma once
 
-#include "renderer/scene/data/texture.h"
+#include "renderer/scene/data/textures/texture.h"
 
 namespace braid {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "renderer/scene/data/image_checks.h"
+#include "renderer/scene/data/textures/image_checks.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "renderer/scene/gltf/gltf_pose.h"
+#include "renderer/scene/gltf/poses/gltf_pose.h"
 
 namespace braid::gltf {
 

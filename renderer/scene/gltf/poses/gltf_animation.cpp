@@ -6,7 +6,7 @@
 #include <unordered_map>
 
 #include "renderer/scene/gltf/document/gltf_accessor.h"
-#include "renderer/scene/gltf/gltf_pose.h"
+#include "renderer/scene/gltf/poses/gltf_pose.h"
 
 namespace braid::gltf {
 
