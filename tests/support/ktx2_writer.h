@@ -15,10 +15,11 @@ using ByteVector = std::vector<uint8_t>;
 // A stream of bits, the least significant bit of every byte first.
 class BitWriter {
  public:
-  void put(uint32_t value, int bits) {
+  // The lowest bits of the value; beyond its 64 there are zeros.
+  void put(uint64_t value, int bits) {
     for (int i = 0; i < bits; ++i, ++count_) {
       if (count_ % 8 == 0) bytes_.push_back(0);
-      if (value >> i & 1) bytes_.back() = static_cast<uint8_t>(bytes_.back() | 1u << (count_ % 8));
+      if (i < 64 && (value >> i & 1)) bytes_.back() = static_cast<uint8_t>(bytes_.back() | 1u << (count_ % 8));
     }
   }
   const ByteVector& bytes() const { return bytes_; }
