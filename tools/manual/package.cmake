@@ -2,7 +2,7 @@
 # What tools/package makes of the installed files: a Debian package for each component.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_VENDOR braid)
-set(CPACK_PACKAGE_CONTACT "braid developers <braid@localhost>")
+set(CPACK_PACKAGE_CONTACT "${BRAID_PACKAGER}")
 set(CPACK_DEBIAN_PACKAGE_HOMEPAGE "")
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_COMPONENTS_GROUPING IGNORE)
