@@ -95,6 +95,35 @@ double worst(const std::vector<Measured>& a, const std::vector<Measured>& b, dou
   return z;
 }
 
+// Where the moving scene is at a time.
+SceneData stillAt(float time) {
+  SceneData data = movingBox();
+  for (TriangleMesh& mesh : data.meshes) {
+    if (!mesh.moves()) continue;
+    const Moment m = momentAt(time, 2);
+    const MeshVertices a = mesh.step(m.first), b = mesh.step(m.first + 1);
+    for (size_t i = 0; i < a.positions.size(); ++i)
+      mesh.positions[i] = between(a.positions[i], b.positions[i], m.fraction);
+    for (size_t i = 0; i < a.normals.size(); ++i) mesh.normals[i] = between(a.normals[i], b.normals[i], m.fraction);
+    mesh.steps.clear();
+  }
+  for (MeshInstance& i : data.instances) {
+    if (i.steps.empty()) continue;
+    i.toWorld = time < 0.5f ? between(i.toWorld, i.steps[0], 2 * time) : between(i.steps[0], i.steps[1], 2 * time - 1);
+    i.steps.clear();
+  }
+  const LightPlace place = placeAt(data.lights[0], time);
+  data.lights[0].position = place.position;
+  data.lights[0].direction = place.direction;
+  data.lights[0].steps.clear();
+  CameraData& camera = data.cameras[0];
+  const Camera at = Camera(camera, kSide, kSide).at(time);
+  camera.toWorld = glm::inverse(at.worldToCamera());
+  camera.steps.clear();
+  data.motion = {};
+  return data;
+}
+
 }  // namespace
 
 // Student's t of 15 degrees of freedom and more exceeds 7 once in 200,000: over 36 blocks and 5 integrators a false
@@ -114,35 +143,6 @@ TEST_CASE("Shutter: all integrators see the same box, of which everything moves"
 }
 
 TEST_CASE("Shutter: the mean of stills at even times is the picture of the open shutter") {
-  // Every still stands where the moving scene is at its time.
-  const auto stillAt = [](float time) {
-    SceneData data = movingBox();
-    for (TriangleMesh& mesh : data.meshes) {
-      if (!mesh.moves()) continue;
-      const Moment m = momentAt(time, 2);
-      const MeshVertices a = mesh.step(m.first), b = mesh.step(m.first + 1);
-      for (size_t i = 0; i < a.positions.size(); ++i)
-        mesh.positions[i] = between(a.positions[i], b.positions[i], m.fraction);
-      for (size_t i = 0; i < a.normals.size(); ++i) mesh.normals[i] = between(a.normals[i], b.normals[i], m.fraction);
-      mesh.steps.clear();
-    }
-    for (MeshInstance& i : data.instances) {
-      if (i.steps.empty()) continue;
-      i.toWorld =
-          time < 0.5f ? between(i.toWorld, i.steps[0], 2 * time) : between(i.steps[0], i.steps[1], 2 * time - 1);
-      i.steps.clear();
-    }
-    const LightPlace place = placeAt(data.lights[0], time);
-    data.lights[0].position = place.position;
-    data.lights[0].direction = place.direction;
-    data.lights[0].steps.clear();
-    CameraData& camera = data.cameras[0];
-    const Camera at = Camera(camera, kSide, kSide).at(time);
-    camera.toWorld = glm::inverse(at.worldToCamera());
-    camera.steps.clear();
-    data.motion = {};
-    return data;
-  };
   const Scene scene(movingBox());
   const std::vector<Measured> blurred = blockMeans(scene, "pt", 32, 5000);
   // A time at random within each of 32 parts, anew for each of the seeds.
