@@ -83,7 +83,8 @@ void PreviewFeed::combine(const Snapshot& snapshot, double seconds) {
 }
 
 void PreviewFeed::showQuick(const Snapshot& snapshot, double seconds) {
-  const PipelineResult result = runCombining(halfSize(*snapshot), choice_, choice_.options(&cancel_), helpers_);
+  // Whoever waits for a first picture waits for no pass.
+  const PipelineResult result = runCombining(halfSize(*snapshot), choice_, choice_.options(&cancel_), 2 * helpers_);
   const PipelineOutput* out = result.find(choice_.methods.back());
   if (cancel_ || !out || !out->ran()) return;
   const Rgb<float> image = doubleSize(out->result.image.mean, snapshot->width, snapshot->height);
