@@ -7,8 +7,6 @@
 
 namespace braid::gltf {
 
-namespace {
-
 // Small files can hold huge empty pictures: bounds what all of them together may take.
 class PixelBudget {
  public:
@@ -21,6 +19,8 @@ class PixelBudget {
   uint64_t limit_;
   std::atomic<uint64_t> used_{0};
 };
+
+namespace {
 
 std::shared_ptr<const Image> pixelsOf(Bytes encoded, const std::string& name, DecodedImage& out) {
   if (!isKtx2(encoded.data(), encoded.size())) return decodeImage(encoded.data(), encoded.size(), name);
@@ -60,6 +60,7 @@ ImageTable::ImageTable(Document& document, const std::set<int>& textures) : docu
   document_.decoded.resize(document_.images.size());
   // Each round, the next choice of the textures that have no pixels yet.
   std::set<int> without = textures;
+  PixelBudget budget(document_.sourceBytes);
   for (size_t choice = 0; !without.empty(); ++choice) {
     std::map<int, bool> wanted;  // image, and whether a texture that reads it has another
     for (auto texture = without.begin(); texture != without.end();) {
@@ -71,7 +72,7 @@ ImageTable::ImageTable(Document& document, const std::set<int>& textures) : docu
       wanted[images[choice]] |= choice + 1 < images.size();
       ++texture;
     }
-    for (const int image : decode(wanted)) report(image, wanted.at(image));
+    for (const int image : decode(wanted, budget)) report(image, wanted.at(image));
     std::erase_if(without, [&](int texture) { return of(texture) != nullptr; });
   }
 }
@@ -87,14 +88,13 @@ ImageTable::Key ImageTable::key(int image) const {
   return {source.uri, source.view};
 }
 
-std::vector<int> ImageTable::decode(const std::map<int, bool>& images) {
+std::vector<int> ImageTable::decode(const std::map<int, bool>& images, PixelBudget& budget) {
   std::vector<int> unique;
   for (const auto& [image, hasOther] : images) {
     document_.usage.mark("images", image);
     document_.useView(document_.images[static_cast<size_t>(image)].view);
     if (first_.emplace(key(image), image).second) unique.push_back(image);
   }
-  PixelBudget budget(document_.sourceBytes);
   parallelFor(unique.size(), [&](size_t i) {
     const auto image = static_cast<size_t>(unique[i]);
     DecodedImage& out = document_.decoded[image];

@@ -17,6 +17,8 @@ namespace braid::gltf {
 // The first that can be decoded is read.
 std::vector<int> imagesOf(const tinygltf::Texture& texture);
 
+class PixelBudget;
+
 class ImageTable {
  public:
   // The textures of the file that are read; their images are decoded in parallel.
@@ -31,7 +33,7 @@ class ImageTable {
   Key key(int image) const;
   const DecodedImage& at(int image) const { return document_.decoded[static_cast<size_t>(first_.at(key(image)))]; }
   // Those that no other entry of the same pixels was decoded for.
-  std::vector<int> decode(const std::map<int, bool>& images);
+  std::vector<int> decode(const std::map<int, bool>& images, PixelBudget& budget);
   void report(int image, bool hasOther);
 
   Document& document_;
