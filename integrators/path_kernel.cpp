@@ -32,7 +32,7 @@ void PathKernel::addEnvironment(const PathState& path, PathSample& sample) const
   if (isBlack(radiance)) return;
   float weight = 1;
   if (!path.lightCouldNotBeSampled)
-    weight = powerHeuristic(path.lastPdfW, context_.lights.pdfEnvironment(path.direction));
+    weight = powerHeuristic(path.lastPdfW, context_.lights.pdfEnvironment(path.lastReceiver(), path.direction));
   add(path.throughput * radiance * weight, path.bounces <= 1, sample);
 }
 

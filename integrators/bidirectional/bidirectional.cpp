@@ -203,7 +203,7 @@ void BidirectionalKernel::addEnvironment(int index, const SubpathState& state) {
   double weight = 1;
   if (state.segments > 1) {
     const float emit = lights_.emission.pdfEmit(context_.lights.environmentLight(), -state.direction, 1, state.time);
-    weight = hitWeight(context_.lights.pdfEnvironment(state.direction), emit, state.mis);
+    weight = hitWeight(context_.lights.pdfEnvironment(state.lastReceiver(), state.direction), emit, state.mis);
   }
   add(index, 0, state.segments + 1, state.throughput * radiance * static_cast<float>(weight));
 }

@@ -158,7 +158,8 @@ void PhotonEyeBatch::addEnvironment(int index, const SubpathState& state) {
   if (state.lightCouldNotBeSampled)
     weight = causticHitWeight(index, state, context_.lights.environmentLight(), -state.direction, 1);
   else
-    weight = powerHeuristic(path.choice * state.lastPdfW, context_.lights.pdfEnvironment(state.direction));
+    weight = powerHeuristic(path.choice * state.lastPdfW,
+                            context_.lights.pdfEnvironment(state.lastReceiver(), state.direction));
   sample.radiance += state.throughput * radiance * weight;
 }
 

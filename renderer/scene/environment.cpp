@@ -117,6 +117,7 @@ void Environment::buildDistribution() {
   for (size_t y = 0; y <= h; ++y)
     marginal_[y] = static_cast<float>(total > 0 ? cumulative[y] / total : double(y) / double(h));
   average_ = total > 0 ? scale_ * Spectrum(mean / sinTotal) : Spectrum(0);
+  if (total > 0) blocks_.build(texels());
 }
 
 Spectrum Environment::radiance(const Vec3& direction) const {
@@ -124,8 +125,13 @@ Spectrum Environment::radiance(const Vec3& direction) const {
   const Vec3 d = toLocal(direction);
   const float phi = std::atan2(d.z, d.x);
   const float theta = std::acos(std::clamp(d.y, -1.0f, 1.0f));
-  const float x = (0.5f + phi * 0.5f * kInvPi) * static_cast<float>(width_) - 0.5f;
-  const float y = theta * kInvPi * static_cast<float>(height_) - 0.5f;
+  return radianceAt((0.5f + phi * 0.5f * kInvPi) * static_cast<float>(width_),
+                    theta * kInvPi * static_cast<float>(height_));
+}
+
+// Bilinear, at a position in the image in texels from its upper left corner.
+Spectrum Environment::radianceAt(float column, float row) const {
+  const float x = column - 0.5f, y = row - 0.5f;
   const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
   const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
   const auto at = [&](int i, int j) { return texel((i % width_ + width_) % width_, std::clamp(j, 0, height_ - 1)); };
@@ -134,25 +140,42 @@ Spectrum Environment::radiance(const Vec3& direction) const {
   return scale_ * (top * (1 - fy) + bottom * fy);
 }
 
-float Environment::sample(Vec2 u, Vec3& direction) const {
+float Environment::sample(const Vec3& normal, Vec2 u, Vec3& direction, Spectrum& radiance) const {
   if (isBlack(average_)) return 0;
   if (!image_) {
     const float z = 1 - 2 * u.x, r = safeSqrt(1 - z * z), phi = 2 * kPi * u.y;
     direction = {r * std::cos(phi), z, r * std::sin(phi)};
+    radiance = scale_;
     return 0.25f * kInvPi;
   }
-  float fx, fy;
-  const size_t y = findInterval(marginal_.data(), static_cast<size_t>(height_), u.y, fy);
-  const size_t x =
-      findInterval(&conditional_[y * (static_cast<size_t>(width_) + 1)], static_cast<size_t>(width_), u.x, fx);
-  const float theta = kPi * (static_cast<float>(y) + fy) / static_cast<float>(height_);
-  const float phi = 2 * kPi * ((static_cast<float>(x) + fx) / static_cast<float>(width_) - 0.5f);
+  Vec2 at;
+  float ratio = 1;
+  if (isBlack(normal)) {
+    const size_t y = findInterval(marginal_.data(), static_cast<size_t>(height_), u.y, at.y);
+    const float* row = &conditional_[y * (static_cast<size_t>(width_) + 1)];
+    const size_t x = findInterval(row, static_cast<size_t>(width_), u.x, at.x);
+    at += Vec2(static_cast<float>(x), static_cast<float>(y));
+  } else {
+    ratio = blocks_.sample(texels(), toLocal(normal), u, at);
+    if (!(ratio > 0)) return 0;
+  }
+  const float theta = kPi * at.y / static_cast<float>(height_);
+  const float phi = 2 * kPi * (at.x / static_cast<float>(width_) - 0.5f);
   const float sinTheta = std::sin(theta);
   direction = toWorld({sinTheta * std::cos(phi), std::cos(theta), sinTheta * std::sin(phi)});
-  return pdfW(direction);
+  radiance = radianceAt(at.x, at.y);
+  if (!(sinTheta > 0)) return 0;
+  return ratio * pdfOfTexel(static_cast<size_t>(at.x), static_cast<size_t>(at.y)) / sinTheta;
 }
 
-float Environment::pdfW(const Vec3& direction) const {
+// Density per solid angle, times the sine of the polar angle.
+float Environment::pdfOfTexel(size_t x, size_t y) const {
+  const float* cdf = &conditional_[y * (static_cast<size_t>(width_) + 1)];
+  const float px = cdf[x + 1] - cdf[x], py = marginal_[y + 1] - marginal_[y];
+  return px * py * static_cast<float>(width_) * static_cast<float>(height_) / (2 * kPi * kPi);
+}
+
+float Environment::pdfW(const Vec3& normal, const Vec3& direction) const {
   if (isBlack(average_)) return 0;
   if (!image_) return 0.25f * kInvPi;
   const Vec3 d = toLocal(direction);
@@ -162,9 +185,8 @@ float Environment::pdfW(const Vec3& direction) const {
   if (!(sinTheta > 0)) return 0;
   const int x = std::clamp(static_cast<int>((0.5f + phi * 0.5f * kInvPi) * static_cast<float>(width_)), 0, width_ - 1);
   const int y = std::clamp(static_cast<int>(theta * kInvPi * static_cast<float>(height_)), 0, height_ - 1);
-  const float* cdf = &conditional_[static_cast<size_t>(y) * (static_cast<size_t>(width_) + 1)];
-  const float px = cdf[x + 1] - cdf[x], py = marginal_[static_cast<size_t>(y) + 1] - marginal_[static_cast<size_t>(y)];
-  return px * py * static_cast<float>(width_) * static_cast<float>(height_) / (2 * kPi * kPi * sinTheta);
+  const float pdf = pdfOfTexel(static_cast<size_t>(x), static_cast<size_t>(y)) / sinTheta;
+  return isBlack(normal) ? pdf : pdf * blocks_.ratio(toLocal(normal), x, y);
 }
 
 }  // namespace braid

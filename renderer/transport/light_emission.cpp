@@ -150,10 +150,9 @@ bool LightEmission::startAtInfinity(uint32_t light, Vec2 uPosition, Vec2 uDirect
     radiance = l.intensity;
   } else {
     Vec3 toLight;
-    if (!(scene_.environment()->sample(uDirection, toLight) > 0)) return false;
+    if (!(scene_.environment()->sample(Vec3(0), uDirection, toLight, radiance) > 0)) return false;
     out.direction = -toLight;
     out.delta = false;
-    radiance = scene_.environment()->radiance(toLight);
   }
   const SceneTraits& t = scene_.traits();
   const Vec2 disc = squareToDisc(uPosition);
@@ -178,7 +177,8 @@ float LightEmission::pdfEmit(uint32_t light, const Vec3& direction, float cosLig
   }
   if (light < lights_.firstDirectional()) return choice * conePdf(lights_.positional(light));
   const float disc = kInvPi / sqr(scene_.traits().radius);
-  return light < lights_.environmentLight() ? choice * disc : choice * disc * scene_.environment()->pdfW(-direction);
+  return light < lights_.environmentLight() ? choice * disc
+                                            : choice * disc * scene_.environment()->pdfW(Vec3(0), -direction);
 }
 
 }  // namespace braid

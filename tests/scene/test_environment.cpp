@@ -38,8 +38,10 @@ struct EnvironmentTest {
 
 // Chi-squared test over cells of latitude and longitude, four to a texel. Each cell's ∫ pdf dω is a midpoint rule of
 // pdf sin θ, which is constant within a texel.
-EnvironmentTest testEnvironment(const Environment& environment, int width, int height, float rotation, Rng& rng) {
-  const int columns = 2 * width, rows = 2 * height, count = 60000;
+EnvironmentTest testEnvironment(const Environment& environment, const EnvironmentData& data, const Vec3& normal,
+                                Rng& rng) {
+  const int columns = 2 * data.image->width, rows = 2 * data.image->height, count = 60000;
+  const float rotation = data.rotation;
   std::vector<double> expected(static_cast<size_t>(columns * rows)), observed(expected.size());
   EnvironmentTest result{0, 0};
   const double area = static_cast<double>(2 * kPi * kPi) / (columns * rows);
@@ -49,13 +51,14 @@ EnvironmentTest testEnvironment(const Environment& environment, int width, int h
       const float theta = kPi * (static_cast<float>(y) + 0.5f) / static_cast<float>(rows);
       const float phi = 2 * kPi * ((static_cast<float>(x) + 0.5f) / static_cast<float>(columns) - 0.5f) - rotation;
       const Vec3 w(std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi));
-      const double share = static_cast<double>(environment.pdfW(w) * std::sin(theta)) * area;
+      const double share = static_cast<double>(environment.pdfW(normal, w) * std::sin(theta)) * area;
       expected[static_cast<size_t>(y * columns + x)] = share * count;
       result.integral += share;
     }
   for (int i = 0; i < count; ++i) {
     Vec3 w;
-    if (!(environment.sample(rng.next2(), w) > 0)) continue;
+    Spectrum radiance;
+    if (!(environment.sample(normal, rng.next2(), w, radiance) > 0)) continue;
     const float turn = (std::atan2(w.z, w.x) + rotation) / (2 * kPi) + 0.5f;
     const int x = static_cast<int>((turn - std::floor(turn)) * static_cast<float>(columns));
     const int y = static_cast<int>(std::acos(std::clamp(w.y, -1.0f, 1.0f)) / kPi * static_cast<float>(rows));
@@ -80,24 +83,65 @@ TEST_CASE("Environment images are sampled with the density that is stated") {
                                    environmentImage(16, 8, noise)};
   cases[1].rotation = 1.2f;
   cases[6].base = 5;  // much of the image is even light, which is left to surfaces
+  // Of any surface, at the poles, where longitude begins and ends, anywhere.
+  const std::vector<Vec3> normals{
+      Vec3(0), {0, 1, 0}, {0, -1, 0}, {-1, 0, 0}, randomDirection(rng), randomDirection(rng)};
   for (int i = 0; i < kTests; ++i) {
-    const EnvironmentTest result =
-        testEnvironment(Environment(cases[i]), cases[i].image->width, cases[i].image->height, cases[i].rotation, rng);
     CAPTURE(i);
-    CHECK(result.integral == doctest::Approx(1).epsilon(1e-5));
-    CHECK(result.pValue > test::sidak(kFalseAlarm, kTests + 1));
+    const Environment environment(cases[i]);
+    for (const Vec3& normal : normals) {
+      const EnvironmentTest result = testEnvironment(environment, cases[i], normal, rng);
+      CAPTURE(normal.y);
+      CHECK(result.integral == doctest::Approx(1).epsilon(1e-5));
+      CHECK(result.pValue > test::sidak(kFalseAlarm, kTests * static_cast<int>(normals.size()) + 1));
+    }
   }
   EnvironmentData constant;
   constant.radiance = Spectrum(2);
   const Environment sky(constant);
   const auto sample = [&](Rng& r) {
     Vec3 w;
-    return sky.sample(r.next2(), w) > 0 ? std::optional<Vec3>(w) : std::nullopt;
+    Spectrum radiance;
+    return sky.sample(Vec3(0), r.next2(), w, radiance) > 0 ? std::optional<Vec3>(w) : std::nullopt;
   };
   const test::ChiSquared result = test::chiSquared(
-      sample, [&](const Vec3& w) { return sky.pdfW(w); }, 1);
+      sample, [&](const Vec3& w) { return sky.pdfW(Vec3(0), w); }, 1);
   CHECK(result.integral == doctest::Approx(1).epsilon(1e-5));
-  CHECK(result.pValue > test::sidak(kFalseAlarm, kTests + 1));
+  CHECK(result.pValue > test::sidak(kFalseAlarm, kTests * static_cast<int>(normals.size()) + 1));
+}
+
+TEST_CASE("For a surface, directions are drawn in proportion to radiance times cosine, within what blocks blur") {
+  Rng rng(12);
+  const Environment environment(environmentImage(64, 32, [](int x, int y) {
+    return Spectrum((x - 20) * (x - 20) + (y - 9) * (y - 9) < 16 ? 30.0f : x > 40 ? 2.0f : 1.0f);
+  }));
+  for (int k = 0; k < 20; ++k) {
+    const Vec3 normal = randomDirection(rng);
+    for (int i = 0; i < 100; ++i) {
+      Vec3 w;
+      Spectrum radiance;
+      if (!(environment.sample(normal, rng.next2(), w, radiance) > 0)) continue;
+      CHECK(radiance.x == doctest::Approx(environment.radiance(w).x).epsilon(2e-3));
+    }
+    // Variance of L cos / pdf over its squared mean: what is left of the noise of light on a matte surface.
+    const auto noise = [&](const Vec3& drawnFor) {
+      double sum = 0, squares = 0;
+      constexpr int kSamples = 20000;
+      for (int i = 0; i < kSamples; ++i) {
+        Vec3 w;
+        Spectrum radiance;
+        const float pdf = environment.sample(drawnFor, rng.next2(), w, radiance);
+        const double v = pdf > 0 ? static_cast<double>(radiance.x * std::max(glm::dot(normal, w), 0.0f) / pdf) : 0;
+        sum += v / kSamples;
+        squares += v * v / kSamples;
+      }
+      return squares / (sum * sum) - 1;
+    };
+    CAPTURE(k);
+    const double plain = noise(Vec3(0)), drawn = noise(normal);
+    CHECK(drawn < 0.25 * plain);
+    CHECK(drawn < 0.2);
+  }
 }
 
 TEST_CASE("Every direction from which the environment shines can be drawn") {
@@ -107,7 +151,8 @@ TEST_CASE("Every direction from which the environment shines can be drawn") {
   int missing = 0;
   for (int i = 0; i < 20000; ++i) {
     const Vec3 w = randomDirection(rng);
-    missing += luminance(environment.radiance(w)) > 0 && !(environment.pdfW(w) > 0);
+    missing += luminance(environment.radiance(w)) > 0 &&
+               !(environment.pdfW(Vec3(0), w) > 0 && environment.pdfW(randomDirection(rng), w) > 0);
   }
   CHECK(missing == 0);
 }
@@ -115,21 +160,22 @@ TEST_CASE("Every direction from which the environment shines can be drawn") {
 TEST_CASE("A black environment is never drawn, and a rotated one turns about the vertical") {
   const Environment black(environmentImage(4, 2, [](int, int) { return Spectrum(0); }));
   Vec3 w;
-  CHECK(black.sample(Vec2(0.3f), w) == 0);
-  CHECK(black.pdfW({0, 1, 0}) == 0);
+  Spectrum radiance;
+  CHECK(black.sample(Vec3(0), Vec2(0.3f), w, radiance) == 0);
+  CHECK(black.pdfW(Vec3(0), {0, 1, 0}) == 0);
   EnvironmentData constant;
-  CHECK(Environment(constant).sample(Vec2(0.3f), w) == 0);
+  CHECK(Environment(constant).sample(Vec3(0), Vec2(0.3f), w, radiance) == 0);
 
   EnvironmentData data =
       environmentImage(64, 32, [](int x, int y) { return Spectrum(x == 40 && y == 12 ? 1.0f : 0.0f); });
   const Environment still(data);
   data.rotation = 0.7f;
   const Environment turned(data);
-  still.sample(Vec2(0.5f), w);
+  still.sample(Vec3(0), Vec2(0.5f), w, radiance);
   const Vec3 moved(glm::rotate(Mat4(1), 0.7f, Vec3(0, 1, 0)) * Vec4(w, 0));
   CHECK(luminance(still.radiance(w)) > 0);
   CHECK(turned.radiance(moved).x == doctest::Approx(still.radiance(w).x).epsilon(1e-3));
-  CHECK(turned.pdfW(moved) == doctest::Approx(still.pdfW(w)).epsilon(1e-3));
+  CHECK(turned.pdfW(Vec3(0), moved) == doctest::Approx(still.pdfW(Vec3(0), w)).epsilon(1e-3));
 }
 
 TEST_CASE("An environment lies as in three.js and in Blender: its centre in +X, its right in +Z, its top in +Y") {
@@ -161,9 +207,10 @@ TEST_CASE("A sun of one texel takes almost all samples and its neighbourhood kee
   constexpr int kSamples = 20000;
   for (int i = 0; i < kSamples; ++i) {
     Vec3 w;
-    const float pdf = environment.sample(rng.next2(), w);
+    Spectrum radiance;
+    const float pdf = environment.sample(Vec3(0), rng.next2(), w, radiance);
     REQUIRE(pdf > 0);
-    mean += static_cast<double>(average(environment.radiance(w)) / pdf) / kSamples;
+    mean += static_cast<double>(average(radiance) / pdf) / kSamples;
   }
   // ∫ L over the sphere. Bilinear interpolation within texels of constant density: a standard deviation of about 1.
   CHECK(mean == doctest::Approx(static_cast<double>(4 * kPi * average(environment.average()))).epsilon(0.05));

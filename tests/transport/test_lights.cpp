@@ -255,7 +255,7 @@ TEST_CASE("A scene without light has nothing to draw") {
   const LightSampler lights(scene, LightStrategy::Automatic);
   LightSample s;
   CHECK_FALSE(lights.sample({Vec3(0), {0, 1, 0}}, 0.5f, Vec2(0.5f), s));
-  CHECK(lights.pdfEnvironment({0, 1, 0}) == 0);
+  CHECK(lights.pdfEnvironment({Vec3(0), Vec3(0, 1, 0)}, {0, 1, 0}) == 0);
 }
 
 }  // namespace braid::test_lights

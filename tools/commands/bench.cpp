@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // `braid bench`: throughput against bare Embree rays, seconds of methods, and what publishing adds to a render.
 #include <algorithm>
+#include <cmath>
+#include <filesystem>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -8,6 +10,7 @@
 
 #include "renderer/core/stopwatch.h"
 #include "tools/bench/bench_combining.h"
+#include "tools/bench/bench_efficiency.h"
 #include "tools/bench/bench_publishing.h"
 #include "tools/bench/bench_rays.h"
 #include "tools/bench/builtin_scenes.h"
@@ -23,7 +26,9 @@ namespace braid {
 namespace {
 
 struct BenchOptions {
-  std::vector<std::string> scenes, combine, publish;
+  std::vector<std::string> scenes, combine, publish, variants;
+  std::string references, referenceIntegrator = "bdpt";
+  uint64_t referenceSpp = 1024;
   SampleChoice samples;
   FrameSize size{512, 512};
   std::string isa = "avx2";
@@ -159,7 +164,50 @@ int runRayBench(const BenchOptions& o, Settings settings) {
   return 0;
 }
 
+void sayEfficiency(const std::string& scene, const nlohmann::json& variants) {
+  fmt::print("{}:\n", scene);
+  for (const nlohmann::json& v : variants) {
+    const auto number = [&](const char* name) { return v[name].get<double>(); };
+    fmt::print("  {:<40} relL2 {:.3e}, HDR-FLIP {:.4f}, {:.2f} processor s ({:.2f} s): error x time {:.3f}\n",
+               v["variant"].get<std::string>(), number("relL2"), number("hdrFlip"), number("processorSeconds"),
+               number("seconds"), number("ratio"));
+  }
+}
+
+// Variants of a render against each other, over all scenes.
+int runEfficiencyBench(const BenchOptions& o) {
+  EfficiencyBench bench;
+  for (const std::string& text : o.variants) bench.variants.push_back(parseVariant(text, o.samples));
+  bench.view.size = o.size;
+  bench.repeats = o.repeats;
+  bench.references =
+      o.references.empty() ? (std::filesystem::temp_directory_path() / "braid-references").string() : o.references;
+  bench.referenceIntegrator = o.referenceIntegrator;
+  bench.referenceSpp = o.referenceSpp;
+  nlohmann::json all = nlohmann::json::array();
+  std::vector<double> logarithms(bench.variants.size(), 0.0);
+  const std::vector<SceneSource> sources = sourcesOf(o);
+  for (const SceneSource& source : sources) {
+    const OpenedScene opened = sceneOf(source, o);
+    const nlohmann::json variants = benchEfficiency(*opened.scene, opened.camera, bench);
+    for (size_t v = 0; v < variants.size(); ++v) logarithms[v] += std::log(variants[v]["ratio"].get<double>());
+    if (!o.json) sayEfficiency(source.name, variants);
+    all.push_back({{"scene", source.name}, {"variants", variants}});
+  }
+  if (o.json) {
+    fmt::print("{}\n", nlohmann::json({{"schema", 1}, {"build", BRAID_BUILD_FLAGS}, {"efficiency", all}}).dump(2));
+    return 0;
+  }
+  if (sources.size() < 2) return 0;
+  fmt::print("geometric mean over {} scenes:\n", sources.size());
+  for (size_t v = 0; v < bench.variants.size(); ++v)
+    fmt::print("  {:<40} error x time {:.3f}\n", bench.variants[v].text,
+               std::exp(logarithms[v] / static_cast<double>(sources.size())));
+  return 0;
+}
+
 int runBench(const BenchOptions& o) {
+  if (!o.variants.empty()) return runEfficiencyBench(o);
   SceneChoice view;
   view.size = o.size;
   Settings settings = makeSettings(view, o.samples);
@@ -178,7 +226,8 @@ void addBench(CLI::App& app, Action& action) {
   command->footer(
       "Examples:\n"
       "  braid bench                 the built-in Cornell box and its million-triangle variant\n"
-      "  braid bench scene.glb --json");
+      "  braid bench scene.glb --json\n"
+      "  braid bench scene.glb --efficiency='--integrator pt' --efficiency='--integrator bdpt'");
   command->add_option("SCENE", o.scenes, "glTF files, builtin:cornell or builtin:million (default: both built-in ones)")
       ->type_name("FILE");
   addSize(*command, o.size);
@@ -190,9 +239,22 @@ void addBench(CLI::App& app, Action& action) {
           "Measure these denoisers and combiners, separated by commas, instead of rays");
   addList(*command, "--publish", o.publish,
           "Measure what publishing images combined by these adds to the passes, instead of rays");
+  command
+      ->add_option("--efficiency", o.variants,
+                   "Compare error x processor time of this variant of a render with that of the first one: options of "
+                   "render about samples and combining, in quotes (repeatable)")
+      ->allow_extra_args(false)
+      ->type_name("OPTIONS");
+  command->add_option("--references", o.references, "Where --efficiency keeps its references")->type_name("FOLDER");
+  command->add_option("--reference-integrator", o.referenceIntegrator, "Renders the references of --efficiency")
+      ->capture_default_str()
+      ->type_name("NAME");
+  command->add_option("--reference-spp", o.referenceSpp, "Samples of the references of --efficiency")
+      ->capture_default_str()
+      ->check(wholeNumber(2, uint64_t(1) << 24));
   command->add_flag("--json", o.json, "As JSON");
   addSampleOptions(*command, o.samples);
-  showFirst(*command, "Measurement", {"--size", "--repeats", "--combine", "--publish", "--json"});
+  showFirst(*command, "Measurement", {"--size", "--repeats", "--combine", "--publish", "--efficiency", "--json"});
   command->callback([options, &action] { action = [options] { return runBench(*options); }; });
 }
 

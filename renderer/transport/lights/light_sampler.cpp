@@ -203,11 +203,11 @@ bool LightSampler::sample(const Receiver& at, float uSelect, Vec2 u, LightSample
     return out.pdfW > 0;
   }
   if (probabilityEnvironment_ == 0) return false;
-  out.pdfW = scene_.environment()->sample(u, out.wi) * probabilityEnvironment_;
+  out.pdfW = scene_.environment()->sample(at.twoSided ? Vec3(0) : at.normal, u, out.wi, out.radiance) *
+             probabilityEnvironment_;
   if (!(out.pdfW > 0) || !std::isfinite(out.pdfW)) return false;
   out.light = environmentLight();
   out.distance = kInfinity;
-  out.radiance = scene_.environment()->radiance(out.wi);
   out.delta = false;
   return true;
 }
@@ -241,12 +241,12 @@ float LightSampler::pdfDirect(uint32_t light, const Receiver& at, const Vec3& to
     const size_t i = light - finite_;
     return (directionalCumulative_[i + 1] - directionalCumulative_[i]) * probabilityDirectional_;
   }
-  return pdfEnvironment(toLight);
+  return pdfEnvironment(at, toLight);
 }
 
-float LightSampler::pdfEnvironment(const Vec3& direction) const {
+float LightSampler::pdfEnvironment(const Receiver& at, const Vec3& direction) const {
   if (probabilityEnvironment_ == 0) return 0;
-  const float pdf = scene_.environment()->pdfW(direction) * probabilityEnvironment_;
+  const float pdf = scene_.environment()->pdfW(at.twoSided ? Vec3(0) : at.normal, direction) * probabilityEnvironment_;
   return std::isfinite(pdf) ? pdf : 0.0f;
 }
 

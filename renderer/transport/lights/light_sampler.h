@@ -48,7 +48,7 @@ class LightSampler {
   // Density with which sample() would pick the direction to a point hit on emitter `index` (distance in metres, cosine
   // at the light > 0).
   float pdfEmitter(const Receiver& at, size_t index, float distance, float cosLight) const;
-  float pdfEnvironment(const Vec3& direction) const;
+  float pdfEnvironment(const Receiver& at, const Vec3& direction) const;
 
   // Density with which sample() at a receiver picks a point of a light: per m² for emissive triangles, per solid angle
   // about `toLight` for the environment, a probability for the others.

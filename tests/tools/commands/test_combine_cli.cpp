@@ -226,4 +226,32 @@ TEST_CASE("bench tells what denoisers and combiners cost, inputs first") {
   CHECK(methods[0]["method"] == "pw");
 }
 
+TEST_CASE(
+    "bench compares error x time of variants of a render with the first, and names a variant that it cannot read") {
+  const Folder folder;
+  const std::string bench =
+      "bench builtin:cornell --size 48x32 --spp 4 --repeats 1 --reference-spp 64 --json "
+      "--references " +
+      (folder.path / "kept").string();
+  const Run run = braidRun(folder, bench +
+                                       " --efficiency='--integrator pt' --efficiency='--integrator pt --spp 16' "
+                                       "--efficiency='--combine auto'");
+  INFO(run.err);
+  REQUIRE(run.code == 0);
+  const nlohmann::json variants = nlohmann::json::parse(run.out)["efficiency"][0]["variants"];
+  REQUIRE(variants.size() == 3);
+  const auto error = [&](size_t v) { return variants[v]["relL2"].get<double>(); };
+  const auto seconds = [&](size_t v) { return variants[v]["processorSeconds"].get<double>(); };
+  CHECK(variants[0]["ratio"] == 1);
+  CHECK(error(1) < 0.5 * error(0));
+  CHECK(error(2) < 0.5 * error(0));
+  for (size_t v = 0; v < 3; ++v)
+    CHECK(variants[v]["ratio"].get<double>() ==
+          doctest::Approx(error(v) * seconds(v) / (error(0) * seconds(0))).epsilon(1e-6));
+  CHECK(!fs::is_empty(folder.path / "kept"));
+  const Run wrong = braidRun(folder, bench + " --efficiency='--integratr pt'");
+  CHECK(wrong.code == 1);
+  CHECK(contains(wrong.err, "--integratr"));
+}
+
 }  // namespace braid::test_combine_cli

@@ -30,7 +30,7 @@ const std::vector<std::string> kWrong = {
 
 // What options that take no numbers say of themselves. A new option says one of these, or gets a check of
 // tools/options/syntax/option_checks.h.
-const std::set<std::string> kTexts = {"FILE", "FILES", "FOLDER", "NAME", "NAMES", "SET"};
+const std::set<std::string> kTexts = {"FILE", "FILES", "FOLDER", "NAME", "NAMES", "OPTIONS", "SET"};
 
 // The command line, parsed anew each time: options keep their values.
 std::string complaintOf(const std::vector<std::string>& words) {
