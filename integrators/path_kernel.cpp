@@ -15,6 +15,7 @@ namespace braid {
 namespace {
 
 constexpr int kMaxNullCrossings = 256;
+constexpr float kLeastGuidedScale = 1e-4f;
 
 // The normal by which lights are chosen at a hit.
 const Vec3& receiverNormal(const Hit& hit, bool twoSided) { return twoSided ? hit.ng : hit.frame.n; }
@@ -85,7 +86,7 @@ void PathKernel::recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsd
   surfaceFeatures(scene_, hit, bsdf, path.featureDistance, sample.features);
 }
 
-bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided,
+bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided,
                              const SampleBlock& block, ShadowRay& shadow) const {
   LightSample light;
   if (!context_.lights.sample({hit.position, receiverNormal(hit, twoSided), twoSided, hit.time},
@@ -112,13 +113,19 @@ bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Bsdf& 
   return true;
 }
 
-// Continues the path in a direction sampled from the BSDF; false when it ends here.
-bool PathKernel::scatter(PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided,
+// Continues the path in a direction sampled from the BSDF and the guide; false when it ends here.
+bool PathKernel::scatter(PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided,
                          const SampleBlock& block) const {
-  BsdfSample sample;
-  if (!bsdf.sample(block.u[slot::kLobe], {block.u[slot::kBsdfU], block.u[slot::kBsdfV]}, sample)) return false;
-  if (!(sample.straight ? passPane(path, hit, sample.weight) : turn(path, hit, bsdf, twoSided, sample))) return false;
-  const float survival = roulette_.survival(path.segments, maxComponent(path.throughput) / path.etaScale);
+  GuidedSample sample;
+  if (!bsdf.sample(block, sample)) return false;
+  if (!(sample.straight ? passPane(path, hit, sample.weight) : turn(path, hit, bsdf.bsdf(), twoSided, sample)))
+    return false;
+  if (!sample.delta) {
+    if (recorder_) recorder_->leave(static_cast<int>(&path - path_.data()), hit, path.direction, bsdf, sample);
+    // Roulette takes the path for one that the BSDF has sampled: where the guide sends many, each carries little.
+    if (bsdf.guided()) path.rouletteScale *= std::max(sample.bsdfPdfW / sample.pdfW, kLeastGuidedScale);
+  }
+  const float survival = roulette_.survival(path.segments, maxComponent(path.throughput) / path.rouletteScale);
   if (survival < 1) {
     if (!(block.u[slot::kRoulette] < survival)) return false;
     path.throughput /= survival;
@@ -135,7 +142,8 @@ bool PathKernel::turn(PathState& path, const Hit& hit, const Bsdf& bsdf, bool tw
   path.throughput *= sample.weight;
   if (isBlack(path.throughput)) return false;
 
-  if (sample.transmitted && hit.material->hasVolume()) path.etaScale *= sqr(crossInterface(scene_, path.media, hit));
+  if (sample.transmitted && hit.material->hasVolume())
+    path.rouletteScale *= sqr(crossInterface(scene_, path.media, hit));
   path.origin = offsetOrigin(hit, direction);
   path.direction = direction;
   path.lastPosition = hit.position;
@@ -238,6 +246,7 @@ void PathKernel::shadeActive() {
   for (int a = 0; a < activeCount_; ++a) {
     const int p = active_[static_cast<size_t>(a)];
     const auto i = static_cast<size_t>(p), ray = static_cast<size_t>(a);
+    if (recorder_) recorder_->arrive(p, sample_[i].radiance);
     if (!(query_[ray].t < kInfinity)) {
       if (observer_) observer_->onMiss();
       addEnvironment(path_[i], sample_[i]);
@@ -299,12 +308,14 @@ bool PathKernel::shade(PathState& path, const Hit& hit, const SampleBlock& block
   if (path.segments >= plan_.settings.maxDepth) return passPane(path, hit, bsdf.straightTransmittance());
 
   const bool twoSided = (lobes & kTransmittingLobes) != 0;
+  const GuidedBsdf guided = guide_ && bsdf.hasNonDelta() ? GuidedBsdf(bsdf, *guide_, hit) : GuidedBsdf(bsdf);
+  if (guided.guided()) ++guidedCount;
   if (bsdf.hasNonDelta()) {
-    hasShadow = sampleLight(path, hit, bsdf, twoSided, block, shadow);
+    hasShadow = sampleLight(path, hit, guided, twoSided, block, shadow);
     shadow.forFeatures = firstNonSpecular && path.featuresDone;
     shadow.direct = path.bounces == 0;
   }
-  return scatter(path, hit, bsdf, twoSided, block);
+  return scatter(path, hit, guided, twoSided, block);
 }
 
 }  // namespace braid

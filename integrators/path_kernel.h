@@ -8,6 +8,7 @@
 // integrators follow the same conventions for hits, media, null interfaces, panes and termination.
 #pragma once
 
+#include "integrators/guiding/guide_record.h"
 #include "integrators/path_sample.h"
 #include "integrators/path_state.h"
 #include "renderer/session/integrator.h"
@@ -60,8 +61,12 @@ class PathKernel {
   const PathSample& sample(int i) const { return sample_[static_cast<size_t>(i)]; }
   void clear() { count_ = 0; }
   void observe(PathObserver* observer) { observer_ = observer; }
+  // Directions are sampled with the guide, too; null: by BSDFs alone.
+  void guideBy(const Guide* guide) { guide_ = guide; }
+  // Every vertex is told to the recorder.
+  void teach(PathRecorder* recorder) { recorder_ = recorder; }
 
-  uint64_t rayCount = 0, shadowRayCount = 0;
+  uint64_t rayCount = 0, shadowRayCount = 0, guidedCount = 0;  // guidedCount: vertices with a guide
 
  protected:
   float timeOf(int x, int y, uint64_t key) const;
@@ -82,9 +87,9 @@ class PathKernel {
   void add(const Spectrum& radiance, bool direct, PathSample& sample) const;
   bool crossNullInterface(PathState& path, const Hit& hit) const;
   bool passPane(PathState& path, const Hit& hit, const Spectrum& weight) const;
-  bool sampleLight(const PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const SampleBlock& block,
-                   ShadowRay& shadow) const;
-  bool scatter(PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const SampleBlock& block) const;
+  bool sampleLight(const PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided,
+                   const SampleBlock& block, ShadowRay& shadow) const;
+  bool scatter(PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided, const SampleBlock& block) const;
   bool turn(PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const BsdfSample& sample) const;
   void recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsdf, PathSample& sample) const;
 
@@ -94,6 +99,8 @@ class PathKernel {
   const PassSampler& sampler_;
   std::vector<RecordedRay>* record_;
   PathObserver* observer_ = nullptr;
+  const Guide* guide_ = nullptr;
+  PathRecorder* recorder_ = nullptr;
   Roulette roulette_;
   bool wantFeatures_, filtered_;
   MediaStack cameraMedia_;  // the solids that the camera is inside of

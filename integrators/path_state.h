@@ -28,7 +28,7 @@ struct PathState {
   float lastPdfW = 0;
   bool lightCouldNotBeSampled = true;  // camera, delta scattering, or a null interface crossed since
 
-  float etaScale = 1;         // undoes the radiance compression of refraction in Russian roulette
+  float rouletteScale = 1;    // undoes in Russian roulette the radiance compression of refraction, and the guide
   int bounces = 0;            // scattered at the first non-specular vertex and since; up to 1 of them, light is direct
   bool featuresDone = false;  // the first non-specular vertex is behind
   float featureDistance = 0;  // metres travelled up to it

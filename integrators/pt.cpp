@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Path tracing: one camera path per pixel and pass, random numbers of its own for every pixel.
+#include "integrators/guide_preparation.h"
 #include "integrators/light_preparation.h"
 #include "integrators/path_kernel.h"
 #include "integrators/registry.h"
@@ -25,12 +26,27 @@ class PathTracer final : public Integrator {
 
   bool separatesDirectLight() const override { return true; }
 
+  std::shared_ptr<const Preparation> prepare(const TransportContext& context, const Plan& plan) const override {
+    return guidingApplies(plan).yes ? std::make_shared<GuidePreparation>(context, plan) : nullptr;
+  }
+  std::optional<PlanLine> planLine(const Plan& plan) const override {
+    const Applies applies = guidingApplies(plan);
+    return PlanLine{applies.yes, "path guiding",
+                    applies.yes && applies.reason.empty() ? "learned before the first pass, and used where it pays"
+                                                          : applies.reason};
+  }
+  WorkingMemory workingMemory(const Plan& plan) const override {
+    if (!guidingApplies(plan).yes) return {};
+    return {guidingBytes(plan), "while the guide of paths is learned"};
+  }
+
   std::unique_ptr<PassSampler> pixelSampler(const Plan& plan, uint64_t pass) const override {
     return std::make_unique<PassSampler>(plan.settings.sampler, plan.settings.seed, kStream, pass);
   }
 
   bool renderPass(const PassRequest& request, PassTarget& target) const override {
-    return renderCameraPaths(*this, request, target);
+    if (!guidingApplies(request.plan).yes) return renderCameraPaths(*this, request, target);
+    return renderCameraPaths(*this, request, target, GuidePreparation::Ref(request)->guide());
   }
 };
 

@@ -84,12 +84,14 @@ inline void storeSample(const PassRequest& request, int x, int y, const PathSamp
 }
 
 // A pass of one camera path for every pixel, followed by the path kernel with the integrator's random numbers and
-// roulette. Returns false when cancelled.
-inline bool renderCameraPaths(const Integrator& integrator, const PassRequest& request, PassTarget& target) {
+// roulette, and with the guide if there is one. Returns false when cancelled.
+inline bool renderCameraPaths(const Integrator& integrator, const PassRequest& request, PassTarget& target,
+                              const Guide* guide = nullptr) {
   const Plan& plan = request.plan;
   const std::unique_ptr<PassSampler> sampler = integrator.pixelSampler(plan, request.pass);
   return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>* record) {
     PathKernel kernel(request.context, plan, *sampler, record, integrator.roulette());
+    kernel.guideBy(guide);
     forEachBatch(
         tile,
         [&](int i, int x, int y) {

@@ -277,14 +277,14 @@ bool GradientKernel::goOn(PathState& path, const Hit& hit, const Bsdf& bsdf, boo
 void GradientKernel::leaveBase(BasePath& base, const Bsdf& bsdf, bool twoSided, const SampleBlock& block) {
   Walker& walker = base.walker;
   Vertex& vertex = base.vertex;
-  const float etaScale = walker.path.etaScale;
+  const float etaScale = walker.path.rouletteScale;
   // By the surfaces met, which shifts meet in step.
   vertex.roulette = walker.path.block() >= kRouletteStart;
   if (!goOn(walker.path, walker.hit, bsdf, twoSided, block)) return;
   if (isBlack(walker.prefix * walker.path.throughput)) return;
   vertex.survived = 1;
   if (vertex.roulette) {
-    vertex.survived = survival(walker.path.throughput, walker.path.etaScale / etaScale);
+    vertex.survived = survival(walker.path.throughput, walker.path.rouletteScale / etaScale);
     if (!(block.u[slot::kRoulette] < vertex.survived)) return;
     walker.path.throughput /= vertex.survived;
   }

@@ -126,8 +126,8 @@ bool GradientKernel::shadeShift(BasePath& base, int j, ShadowRay& shadow, RayQue
 bool GradientKernel::replay(const Vertex& vertex, ShiftedPath& shift, const Bsdf& bsdf, bool twoSided,
                             const SampleBlock& block) const {
   Walker& w = shift.walker;
-  const float etaScale = w.path.etaScale;
-  return goOn(w.path, w.hit, bsdf, twoSided, block) && takeRoulette(vertex, w.path.etaScale / etaScale, shift);
+  const float etaScale = w.path.rouletteScale;
+  return goOn(w.path, w.hit, bsdf, twoSided, block) && takeRoulette(vertex, w.path.rouletteScale / etaScale, shift);
 }
 
 // Turns a shift to the base path's next vertex. False: it cannot see or light it; else `ray` decides.

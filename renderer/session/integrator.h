@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,8 @@ struct PassStatistics {
 // What an integrator works out once per render and all its passes read, for instance which lights reach what is seen.
 struct Preparation {
   virtual ~Preparation() = default;
+  // What was decided on the way, and why.
+  virtual std::optional<PlanLine> decision() const { return std::nullopt; }
 };
 
 // Memory of a pass besides the film, and what it is for.
@@ -75,6 +78,8 @@ class Integrator {
   virtual Applies applies(const SceneTraits& traits, const LightReach& reach) const = 0;
   // Share of the light in view that it cannot find, however long it renders.
   virtual double misses(const LightReach&) const { return 0; }
+  // What prepare() will decide, or why it need not.
+  virtual std::optional<PlanLine> planLine(const Plan&) const { return std::nullopt; }
   // Of one pass with this plan's window and settings.
   virtual WorkingMemory workingMemory(const Plan&) const { return {}; }
   // Renders pass `request.pass` of the plan's window into the target. Returns false when cancelled.

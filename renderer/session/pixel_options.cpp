@@ -30,6 +30,10 @@ const char* toString(LightStrategy strategy) {
   return strategy == LightStrategy::Automatic ? "auto" : strategy == LightStrategy::Power ? "power" : "hierarchy";
 }
 
+const char* toString(Guiding guiding) {
+  return guiding == Guiding::Automatic ? "auto" : guiding == Guiding::On ? "on" : "off";
+}
+
 }  // namespace
 
 std::vector<StateOption> pixelOptions(const Plan& plan) {
@@ -50,6 +54,7 @@ std::vector<StateOption> pixelOptions(const Plan& plan) {
       {"--filter", toString(s.filter)},
       {"--max-depth", std::to_string(s.maxDepth)},
       {"--lights", toString(s.lightStrategy)},
+      {"--guiding", toString(s.guiding)},
       {"--clamp", fmt::format("{}", s.clamp)},
       {"--background",
        s.background ? fmt::format("{},{},{}", s.background->x, s.background->y, s.background->z) : "none"},

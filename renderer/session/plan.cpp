@@ -266,6 +266,8 @@ Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& sett
                                              w.x1, w.y1, settings.width, settings.height));
   requireShadowAlpha(scene, settings);
   planIntegrators(scene, plan.settings, available, plan);
+  for (const PlannedIntegrator& p : plan.integrators)
+    if (const auto line = p.integrator->planLine(plan)) plan.lines.push_back(*line);
   planSceneParts(scene, settings, plan);
   planMotion(scene, plan);
   planView(scene, plan);
@@ -292,6 +294,7 @@ uint64_t Plan::hash() const {
   h.add(fmt::format("{} {} {} {} {} {} {} {}", settings.width, settings.height, settings.maxDepth, settings.seed,
                     static_cast<int>(settings.sampler), toString(settings.filter), settings.clamp,
                     settings.transparent));
+  h.add(fmt::format("{}", static_cast<int>(settings.guiding)));
   h.add(fmt::format("{} {} {} {}", settings.photons, settings.photonRadius, settings.photonDirect,
                     settings.photonAiming));
   return h.value();

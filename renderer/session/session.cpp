@@ -9,6 +9,7 @@
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 #include "renderer/core/stopwatch.h"
+#include "renderer/film/make_attribute.h"
 #include "renderer/session/film_of_plan.h"
 #include "renderer/session/pixel_options.h"
 
@@ -54,7 +55,10 @@ class Session::Loop {
       cancellable(abandon_,
                   [&] { preparations_[i] = plan_.integrators[i].integrator->prepare(session_.context_, plan_); });
       film_.estimates[i].seconds += preparing.seconds();
+      if (preparations_[i])
+        if (auto decision = preparations_[i]->decision()) result_.decisions.push_back(std::move(*decision));
     }
+    recordDecisions();
   }
 
   // Whether the limits of the settings end the run; sets the reason then.
@@ -105,6 +109,14 @@ class Session::Loop {
   double seconds() const { return clock_.seconds(); }
 
  private:
+  // What the preparations decided stands in the headers of images.
+  void recordDecisions() {
+    for (const PlanLine& line : result_.decisions) {
+      const std::string name = "braid/" + line.subject;
+      std::erase_if(film_.attributes, [&](const Attribute& a) { return a.name == name; });
+      film_.attributes.push_back(textAttribute(name, fmt::format("{} {}", line.kept ? '+' : '-', line.reason)));
+    }
+  }
   bool hasTimeLimit() const { return session_.timeLeft_ || plan_.settings.seconds > 0; }
   double timeLeft() const { return session_.timeLeft_ ? session_.timeLeft_() : plan_.settings.seconds - seconds(); }
 

@@ -44,6 +44,7 @@ struct RunReport {
     int x = 0, y = 0;
   };
   std::optional<RejectedSample> firstRejected;
+  std::vector<PlanLine> decisions;  // of the integrators' preparations
 };
 
 struct RenderResult : RunReport {

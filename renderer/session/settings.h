@@ -15,6 +15,8 @@
 namespace braid {
 
 enum class PixelFilter { Box, Gaussian, BlackmanHarris };
+// Whether camera paths learn where light comes from; automatic: where that pays.
+enum class Guiding { Automatic, On, Off };
 
 struct Settings {
   int width = 1280, height = 720;  // full frame, pixels
@@ -28,6 +30,7 @@ struct Settings {
   SamplerKind sampler = SamplerKind::Sobol;
   PixelFilter filter = PixelFilter::Box;
   LightStrategy lightStrategy = LightStrategy::Automatic;
+  Guiding guiding = Guiding::Automatic;
   KeptBuffers keep{.features = true};
   bool transparent = false;            // camera rays that miss: no radiance, alpha 0
   std::optional<Spectrum> background;  // what camera rays that miss see instead of the environment

@@ -20,6 +20,9 @@ const std::vector<std::pair<std::string, PixelFilter>> kFilters{
 const std::vector<std::pair<std::string, LightStrategy>> kLights{
     {"auto", LightStrategy::Automatic}, {"power", LightStrategy::Power}, {"hierarchy", LightStrategy::Hierarchy}};
 
+const std::vector<std::pair<std::string, Guiding>> kGuidings{
+    {"auto", Guiding::Automatic}, {"on", Guiding::On}, {"off", Guiding::Off}};
+
 const std::vector<std::pair<std::string, DefaultLight>> kDefaultLights{
     {"studio", DefaultLight::Studio}, {"dome", DefaultLight::Dome}, {"none", DefaultLight::None}};
 
@@ -160,6 +163,8 @@ void addSampleOptions(CLI::App& command, SampleChoice& c) {
   addNamed(command, "--filter", c.filter, {"filter", kFilters}, "Pixel filter: box, gaussian or blackman-harris");
   addNamed(command, "--lights", c.lights, {"light strategy", kLights},
            "How lights are chosen: auto, power or hierarchy");
+  addNamed(command, "--guiding", c.guiding, {"guiding", kGuidings},
+           "Whether pt learns where light comes from: auto (where it pays), on or off");
   addThreads(command, c.threads);
   command.add_option("--clamp", c.clamp, "Clamp a path's radiance (biased; 0: off)")
       ->capture_default_str()
@@ -183,6 +188,7 @@ Settings makeSettings(const SceneChoice& scene, const SampleChoice& samples) {
   s.sampler = samples.sampler;
   s.filter = samples.filter;
   s.lightStrategy = samples.lights;
+  s.guiding = samples.guiding;
   s.threads = samples.threads;
   s.clamp = static_cast<float>(samples.clamp);
   s.photons = samples.photons;

@@ -47,6 +47,7 @@ struct SampleChoice {
   SamplerKind sampler = SamplerKind::Sobol;
   PixelFilter filter = PixelFilter::Box;
   LightStrategy lights = LightStrategy::Automatic;
+  Guiding guiding = Guiding::Automatic;
   double seconds = 0;  // of --time, 0: none
   uint64_t spp = 0;    // 0: not said
   int maxDepth = 32;

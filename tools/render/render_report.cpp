@@ -68,6 +68,8 @@ void sayResult(const FinishedRender& render, const RenderOptions& o) {
   for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
   if (r.rejected > 0) fmt::print(stderr, "warning: {} non-finite or negative samples counted as 0\n", r.rejected);
   if (r.firstRejected) fmt::print(stderr, "one of them: {}\n", describe(*r.firstRejected, o));
+  for (const PlanLine& line : r.decisions)
+    fmt::print(stderr, "{} {}: {}\n", line.kept ? '+' : '-', line.subject, line.reason);
   for (const std::string& text : written.timings) fmt::print(stderr, "{}\n", text);
   if (written.tone) fmt::print(stderr, "{}\n", describe(*written.tone));
   std::string outputs;

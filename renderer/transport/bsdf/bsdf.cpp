@@ -227,4 +227,30 @@ bool Bsdf::samplePassThrough(BsdfSample& out) const {
   return true;
 }
 
+bool Bsdf::isDelta(size_t slot) const {
+  if (slot == kPassThrough) return true;
+  if (slot < kFirstCover) return slot == kSpecular && specular_.smooth();
+  bool smooth = false;
+  covers_.upward([&](const auto& cover, size_t i) {
+    if (kFirstCover + i == slot) smooth = cover.smooth();
+  });
+  return smooth;
+}
+
+float Bsdf::layersDeltaShare() const {
+  float share = 0;
+  for (size_t slot = 0; slot < kSlots; ++slot)
+    if (select_[slot] > 0 && isDelta(slot)) share += select_[slot];
+  return share;
+}
+
+bool Bsdf::layersPickDelta(float uLobe) const {
+  constexpr std::array<size_t, kSlots> kOrder = pickingOrder();
+  for (const size_t slot : kOrder) {
+    if (uLobe < select_[slot]) return isDelta(slot);
+    uLobe -= select_[slot];
+  }
+  return false;
+}
+
 }  // namespace braid

@@ -69,6 +69,9 @@ class Bsdf {
   bool diffuseOnly() const { return diffuseOnly_; }
   // Probability that sample() picks a broad lobe: 1 for diffuse surfaces, 0 also for black ones.
   float broadShare() const { return diffuseOnly_ ? 1.0f : layersBroadShare(); }
+  // Probability that sample() picks a delta lobe, and whether it does so for this uLobe.
+  float deltaShare() const { return diffuseOnly_ ? 0.0f : layersDeltaShare(); }
+  bool picksDelta(float uLobe) const { return !diffuseOnly_ && layersPickDelta(uLobe); }
   // The lobes of one group alone, as the layers above leave them: values add up to those of all lobes, probabilities of
   // selection are renormalised. albedo() stays that of all lobes.
   Bsdf restricted(LobeGroup group) const;
@@ -128,6 +131,9 @@ class Bsdf {
   bool sampleLayers(float uLobe, const Vec2& u, BsdfSample& out) const;
   bool sampleSlot(size_t slot, float uLobe, const Vec2& u, BsdfSample& out, BsdfValue& v) const;
   bool samplePassThrough(BsdfSample& out) const;
+  bool isDelta(size_t slot) const;
+  float layersDeltaShare() const;
+  bool layersPickDelta(float uLobe) const;
 
   // lobe_groups.cpp
   uint32_t broadLobes() const;

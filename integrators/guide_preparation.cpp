@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "integrators/guide_preparation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "integrators/guide_photons.h"
+#include "integrators/path_kernel.h"
+#include "renderer/core/parallel.h"
+
+namespace braid {
+
+namespace {
+
+constexpr uint64_t kStream = 0x6775696465;
+// Frames with fewer pixels cost less to render than to learn for.
+constexpr uint64_t kFewestPixels = 16384;
+// The grid has about a pixel for every 16 of the frame, within these bounds.
+constexpr uint64_t kFewestPlaces = 2048, kMostPlaces = 4096;
+
+// Passes over the grid. The first ones find where light is at all; unguided ones are what guided ones have to beat.
+struct Round {
+  int passes;
+  bool guided;
+};
+constexpr Round kRounds[] = {{2, false}, {4, true}, {2, false}, {4, true}};
+constexpr int kPasses = 12;
+constexpr ShareRange kLearning{0.25f, 0.75f};
+
+// Guided paths must promise so many times less variance x cost. Where light that comes straight from lamps is more than
+// the other share of the variance, there is nothing to promise.
+constexpr double kPays = 1.05, kHopeless = 0.9, kMostDirect = 0.85;
+// Of a shadow ray and of a guided vertex, in rays.
+constexpr double kShadowCost = 0.4, kGuidedCost = 0.4;
+// What counts as the brightness of a black pixel: this share of the mean.
+constexpr double kDarkest = 0.1;
+// Samples above this many times their pixel's brightness count as that.
+constexpr double kMostRelative = 32;
+
+// Pixels of the full frame on a square grid.
+struct Grid {
+  explicit Grid(const Settings& s) {
+    const uint64_t pixels = static_cast<uint64_t>(s.width) * static_cast<uint64_t>(s.height);
+    const uint64_t places = std::clamp(pixels / 16, kFewestPlaces, kMostPlaces);
+    stride = 1;
+    while (count(s, stride) > places) ++stride;
+    columns = (s.width + stride - 1) / stride;
+    rows = (s.height + stride - 1) / stride;
+    width = s.width;
+    height = s.height;
+  }
+  static uint64_t count(const Settings& s, int stride) {
+    return static_cast<uint64_t>((s.width + stride - 1) / stride) *
+           static_cast<uint64_t>((s.height + stride - 1) / stride);
+  }
+  size_t size() const { return static_cast<size_t>(columns) * static_cast<size_t>(rows); }
+  int x(size_t i) const { return std::min(static_cast<int>(i) % columns * stride + stride / 2, width - 1); }
+  int y(size_t i) const { return std::min(static_cast<int>(i) / columns * stride + stride / 2, height - 1); }
+
+  int stride, columns, rows, width, height;
+};
+
+struct Cost {
+  uint64_t rays = 0, shadowRays = 0, guided = 0;
+  Cost& operator+=(const Cost& o) {
+    rays += o.rays;
+    shadowRays += o.shadowRays;
+    guided += o.guided;
+    return *this;
+  }
+  double sum() const {
+    return static_cast<double>(rays) + kShadowCost * static_cast<double>(shadowRays) +
+           kGuidedCost * static_cast<double>(guided);
+  }
+};
+
+class Training {
+ public:
+  Training(const TransportContext& context, const Plan& plan) : context_(context), plan_(plan), grid_(plan.settings) {}
+
+  void run(const Round& round) {
+    const size_t pixels = grid_.size(), first = pass_.size();
+    for (int k = 0; k < round.passes; ++k) pass_.push_back({round.guided, std::vector<Sample>(pixels), {}});
+    std::vector<PassSampler> samplers;
+    for (int k = 0; k < round.passes; ++k)
+      samplers.emplace_back(SamplerKind::Independent, plan_.settings.seed, kStream, first + static_cast<size_t>(k));
+    const size_t chunks = (pixels + kBatch - 1) / kBatch;
+    std::vector<std::vector<GuideRecord>> found(chunks);
+    std::vector<std::vector<Cost>> costs(chunks);
+    parallelChunks(pixels, kBatch, [&](size_t begin, size_t end) {
+      const auto recorder = std::make_unique<PathRecorder>();
+      for (size_t k = 0; k < samplers.size(); ++k)
+        costs[begin / kBatch].push_back(
+            trace(samplers[k], pass_[first + k], {begin, end}, *recorder, found[begin / kBatch]));
+    });
+    size_t more = 0;
+    for (const std::vector<GuideRecord>& f : found) more += f.size();
+    records_.reserve(records_.size() + more);
+    for (size_t c = 0; c < chunks; ++c) {
+      records_.insert(records_.end(), found[c].begin(), found[c].end());
+      for (size_t k = 0; k < costs[c].size(); ++k) pass_[first + k].cost += costs[c][k];
+    }
+  }
+
+  void learn(const ShareRange& shares) {
+    if (photons_.empty()) photons_ = traceGuidePhotons(context_, plan_);
+    guide_ = learnGuide(photons_, records_, scales(), shares);
+  }
+  const Guide& guide() const { return guide_; }
+  Guide take() { return std::move(guide_); }
+
+  // How many times less variance x cost the last `guided` guided passes have than all unguided ones.
+  double gain(int guided) const {
+    const double with = inefficiency(true, guided);
+    return with > 0 ? inefficiency(false, kPasses) / with : 0;
+  }
+  // Share of direct light in the variance of unguided paths.
+  double directShare() const {
+    const std::vector<const Pass*> passes = of(false, kPasses);
+    const double all = variance(passes, [](const Sample& s) { return s.value; });
+    return all > 0 ? variance(passes, [](const Sample& s) { return s.direct; }) / all : 1;
+  }
+  size_t paths() const { return pass_.size() * grid_.size(); }
+
+ private:
+  struct Sample {
+    float value, direct;
+  };
+  struct Pass {
+    bool guided;
+    std::vector<Sample> sample;
+    Cost cost;
+  };
+  struct Chunk {
+    size_t begin, end;
+  };
+
+  Cost trace(const PassSampler& sampler, Pass& pass, Chunk chunk, PathRecorder& recorder,
+             std::vector<GuideRecord>& found) const {
+    PathKernel kernel(context_, plan_, sampler, nullptr);
+    kernel.guideBy(pass.guided ? &guide_ : nullptr);
+    kernel.teach(&recorder);
+    recorder.begin();
+    for (size_t i = chunk.begin; i < chunk.end; ++i)
+      kernel.start(grid_.x(i), grid_.y(i), sampler.itemKey(pixelItem(plan_, grid_.x(i), grid_.y(i))));
+    kernel.run();
+    for (size_t i = chunk.begin; i < chunk.end; ++i) {
+      const auto k = static_cast<int>(i - chunk.begin);
+      const PathSample& s = kernel.sample(k);
+      const float value = average(s.radiance);
+      pass.sample[i] = std::isfinite(value) ? Sample{value, average(s.direct)} : Sample{0, 0};
+      recorder.finish(k, s.radiance, static_cast<uint32_t>(i), found);
+    }
+    return {kernel.rayCount, kernel.shadowRayCount, kernel.guidedCount};
+  }
+
+  // Mean over pixels of the relative variance of one path, times the cost of a pass; of the last passes of a kind.
+  double inefficiency(bool guided, int last) const {
+    Cost cost;
+    std::vector<const Pass*> passes = of(guided, last);
+    for (const Pass* p : passes) cost += p->cost;
+    return variance(passes, [](const Sample& s) { return s.value; }) * cost.sum() / static_cast<double>(passes.size());
+  }
+
+  std::vector<const Pass*> of(bool guided, int last) const {
+    std::vector<const Pass*> passes;
+    for (auto p = pass_.rbegin(); p != pass_.rend() && static_cast<int>(passes.size()) < last; ++p)
+      if (p->guided == guided) passes.push_back(&*p);
+    return passes;
+  }
+
+  // For each pixel 1 / its brightness, the mean over its surroundings.
+  std::vector<float> scales() const {
+    std::vector<double> mean(grid_.size(), 0.0);
+    double whole = 0;
+    for (size_t i = 0; i < mean.size(); ++i) {
+      for (const Pass& p : pass_) mean[i] += static_cast<double>(p.sample[i].value) / static_cast<double>(pass_.size());
+      whole += mean[i] / static_cast<double>(mean.size());
+    }
+    std::vector<float> scale(grid_.size());
+    constexpr int kRadius = 2;
+    for (int y = 0; y < grid_.rows; ++y)
+      for (int x = 0; x < grid_.columns; ++x) {
+        double sum = 0, count = 0;
+        for (int v = std::max(0, y - kRadius); v <= std::min(grid_.rows - 1, y + kRadius); ++v)
+          for (int u = std::max(0, x - kRadius); u <= std::min(grid_.columns - 1, x + kRadius); ++u, ++count)
+            sum += mean[static_cast<size_t>(v * grid_.columns + u)];
+        const double brightness = sum / count + kDarkest * whole;
+        scale[static_cast<size_t>(y * grid_.columns + x)] = brightness > 0 ? static_cast<float>(1 / brightness) : 0.0f;
+      }
+    return scale;
+  }
+
+  template <class Part>
+  double variance(const std::vector<const Pass*>& passes, const Part& part) const {
+    const std::vector<float> scale = scales();
+    const auto n = static_cast<double>(passes.size());
+    double total = 0;
+    for (size_t i = 0; i < grid_.size(); ++i) {
+      double sum = 0, squares = 0;
+      for (const Pass* p : passes) {
+        const double v = std::min(static_cast<double>(part(p->sample[i]) * scale[i]), kMostRelative);
+        sum += v;
+        squares += v * v;
+      }
+      total += (squares - sum * sum / n) / (n - 1);
+    }
+    return total / static_cast<double>(grid_.size());
+  }
+
+  const TransportContext& context_;
+  const Plan& plan_;
+  const Grid grid_;
+  std::vector<Pass> pass_;
+  std::vector<GuidePhoton> photons_;
+  std::vector<GuideRecord> records_;
+  Guide guide_;
+};
+
+// All rounds, or as many as it takes to see that nothing will come of it. `forced`: kept in any case.
+PlanLine train(Training& training, bool forced) {
+  const auto line = [](bool kept, std::string reason) { return PlanLine{kept, "path guiding", std::move(reason)}; };
+  for (const Round& round : kRounds) {
+    training.run(round);
+    const bool first = &round == kRounds;
+    if (const double direct = first && !forced ? training.directShare() : 0; direct > kMostDirect)
+      return line(false,
+                  fmt::format("direct light is {:.0f} % of the variance of {} paths", 100 * direct, training.paths()));
+    if (round.guided && training.gain(round.passes) < kHopeless && !forced) break;
+    if (round.guided || first) training.learn(&round == std::end(kRounds) - 1 ? ShareRange{} : kLearning);
+  }
+  const double gain = training.gain(std::end(kRounds)[-1].passes);
+  if (!forced && gain < kPays)
+    return line(false, fmt::format("variance x cost would be {:.2f} times less, by {} paths", gain, training.paths()));
+  const Guide& guide = training.guide();
+  return line(true, fmt::format("variance x cost is {:.2f} times less, by {} paths: {} regions, {:.1f} MiB", gain,
+                                training.paths(), guide.regions(), static_cast<double>(guide.bytes()) / 1048576.0));
+}
+
+}  // namespace
+
+Applies guidingApplies(const Plan& plan) {
+  const Settings& s = plan.settings;
+  if (s.guiding == Guiding::Off) return {false, "on request"};
+  if (s.maxDepth < 3) return {false, "paths scatter once at most"};
+  if (s.guiding == Guiding::On) return {true, "on request"};
+  if (static_cast<uint64_t>(s.width) * static_cast<uint64_t>(s.height) < kFewestPixels)
+    return {false,
+            fmt::format("the frame has fewer than {} pixels: learning would cost more than them", kFewestPixels)};
+  return {true, ""};
+}
+
+uint64_t guidingBytes(const Plan& plan) {
+  // Of a record: itself, its copy while it is sorted, and the same of its part of the last round; the guide.
+  constexpr uint64_t kRecordBytes = 2 * sizeof(GuideRecord) + 32;
+  return Grid(plan.settings).size() * kPasses * PathRecorder::kMostVertices * kRecordBytes +
+         kMostGuidePhotons * 2 * sizeof(GuidePhoton);
+}
+
+GuidePreparation::GuidePreparation(const TransportContext& context, const Plan& plan) {
+  if (!guidingApplies(plan).yes) return;
+  Training training(context, plan);
+  decision_ = train(training, plan.settings.guiding == Guiding::On);
+  if (decision_->kept) guide_ = training.take();
+}
+
+}  // namespace braid
