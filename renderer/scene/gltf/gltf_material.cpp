@@ -211,6 +211,7 @@ class MaterialReader {
 
 std::vector<int> imagesOf(const tinygltf::Texture& texture) {
   std::vector<int> images = {index(member(texture.extensions, "KHR_texture_basisu"), "source"),
+                             index(member(texture.extensions, "EXT_texture_avif"), "source"),
                              index(member(texture.extensions, "EXT_texture_webp"), "source"), texture.source};
   std::erase_if(images, [](int image) { return image < 0; });
   return images;
