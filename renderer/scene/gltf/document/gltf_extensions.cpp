@@ -91,8 +91,8 @@ void checkExtensions(Document& document, const nlohmann::json& root) {
   for (size_t i = 0; i < required.size(); ++i) {
     const std::string& name = required[i];
     const std::string place = "/extensionsRequired/" + std::to_string(i);
-    // Spreading colours and moving what is no node are not rendered: never silently.
-    if (name == "KHR_materials_dispersion" || (name == "KHR_animation_pointer" && document.options.frameTime))
+    // Moving what is no node is not rendered: never silently.
+    if (name == "KHR_animation_pointer" && document.options.frameTime)
       document.report.warn(place,
                            "extension " + quoted(name) + " is read but not rendered; the picture lacks its effect");
     if (isSupported(name)) continue;
