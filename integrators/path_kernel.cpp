@@ -7,6 +7,7 @@
 #include "integrators/camera_paths.h"
 #include "integrators/path_time.h"
 #include "renderer/core/error.h"
+#include "renderer/transport/dispersion.h"
 #include "renderer/transport/mis.h"
 #include "renderer/transport/shadow_ray.h"
 
@@ -174,6 +175,7 @@ void PathKernel::startAt(float time, int x, int y, uint64_t key) {
   path.direction = ray.direction;
   path.time = time;
   path.media = scene_.moves() ? mediaOfCamera(scene_, plan_.camera, time) : cameraMedia_;
+  path.channel = channelOf(scene_, sampler_, key);
   path.segments = 1;
 }
 
@@ -298,11 +300,11 @@ bool PathKernel::shade(PathState& path, const Hit& hit, const SampleBlock& block
     if (material.emissive) addEmission(path, hit, sample);
     sample.onGround = sample.onGround || (material.ground && path.fromCamera());
   }
+  splitColours(context_, path.media, hit, path.channel, path.throughput);
   const uint32_t lobes = material.lobes;
   const Vec3 wo = hit.frame.toLocal(hit.wo);
-  const Bsdf bsdf = lobes == kLobeDiffuse
-                        ? Bsdf(baseColorAt(scene_, hit), wo)
-                        : Bsdf(surfaceAt(scene_, hit, lobes, indexOutside(scene_, path.media, hit)), wo);
+  const Bsdf bsdf = lobes == kLobeDiffuse ? Bsdf(baseColorAt(scene_, hit), wo)
+                                          : Bsdf(surfaceAt(scene_, hit, lobes, path.media, path.channel), wo);
   const bool firstNonSpecular = wantFeatures_ && !path.featuresDone;
   if (firstNonSpecular) recordFeatures(path, hit, bsdf, sample);
   if (path.segments >= plan_.settings.maxDepth) return passPane(path, hit, bsdf.straightTransmittance());

@@ -14,6 +14,7 @@ struct PathState {
   Vec3 origin, direction;
   Spectrum throughput{1};
   MediaStack media;
+  PathChannel channel;
   int segments = 0;       // traced so far, null interfaces not counted
   int nullCrossings = 0;  // bounds a path through degenerate nested surfaces
   int panes = 0;          // passed straight; they are no vertices

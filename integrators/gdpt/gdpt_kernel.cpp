@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "renderer/core/error.h"
+#include "renderer/transport/dispersion.h"
 
 namespace braid {
 
@@ -141,7 +142,7 @@ void GradientKernel::meetSurface(Walker& walker, PathSample& sample) {
     walker.surface.lobes = kLobeDiffuse;
     walker.surface.baseColor = baseColorAt(scene_, walker.hit);
   } else {
-    walker.surface = surfaceAt(scene_, walker.hit, material.lobes, indexOutside(scene_, walker.path.media, walker.hit));
+    walker.surface = surfaceAt(scene_, walker.hit, material.lobes, walker.path.media, walker.path.channel);
   }
   // Inside of a solid the far side of a connection may lie in another medium.
   walker.rough = walker.path.media.empty() && roughSurface(walker.surface);
@@ -195,9 +196,15 @@ void GradientKernel::pairEmission(BasePath& base) {
       w.path.throughput = walker.path.throughput;
     }
     pair(base.result, j, vertex.emitted, w.prefix * w.emitted, shift.jacobian, false);
-    w.fold();
+    fold(w, walker);
   }
-  walker.fold();
+  fold(walker, walker);
+}
+
+void GradientKernel::fold(Walker& walker, const Walker& at) const {
+  walker.prefix *= walker.path.throughput;
+  walker.path.throughput = Spectrum(1);
+  if (at.arrival == Arrival::Surface) splitColours(context_, at.path.media, at.hit, walker.path.channel, walker.prefix);
 }
 
 void GradientKernel::shadeBases() {

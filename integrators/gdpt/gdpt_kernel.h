@@ -60,10 +60,6 @@ class GradientKernel : PathKernel {
     bool rough = false;     // can be reconnected from
     bool straight = false;  // no null interface lies on the last segment
     bool reconnectable() const { return arrival == Arrival::Surface && rough && straight; }
-    void fold() {
-      prefix *= path.throughput;
-      path.throughput = Spectrum(1);
-    }
   };
   struct ShiftedPath {
     Walker walker;
@@ -99,6 +95,9 @@ class GradientKernel : PathKernel {
   // True: a null interface, the ray goes on.
   bool meet(Walker& walker, const RayHit& query, PathSample& sample);
   void meetSurface(Walker& walker, PathSample& sample);
+
+  // Takes what a path has carried so far into its prefix, at the vertex where the walker `at` is.
+  void fold(Walker& walker, const Walker& at) const;
 
   void shadeBases();
   void pairEmission(BasePath& base);

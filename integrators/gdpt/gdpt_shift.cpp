@@ -99,7 +99,7 @@ bool GradientKernel::shadeShift(BasePath& base, int j, ShadowRay& shadow, RayQue
     return false;
   }
   if (!w.path.fromCamera()) pair(base.result, j, vertex.emitted, w.prefix * w.emitted, shift.jacobian, false);
-  w.fold();
+  fold(w, w);
   if (vertex.arrival != Arrival::Surface || w.arrival != Arrival::Surface) {
     shift.state = Shift::Failed;
     shift.lightFailed = true;

@@ -31,7 +31,7 @@ struct SampleBlock {
 namespace slot {
 inline constexpr unsigned kLightSelect = 0, kLightU = 1, kLightV = 2, kLobe = 3, kBsdfU = 4, kBsdfV = 5, kRoulette = 6,
                           kExtra = 7;
-inline constexpr unsigned kPixelX = 0, kPixelY = 1, kLensU = 2, kLensV = 3, kTime = 4;
+inline constexpr unsigned kPixelX = 0, kPixelY = 1, kLensU = 2, kLensV = 3, kTime = 4, kChannel = 5;
 }  // namespace slot
 
 // The points of one pass: what all its pixels share.

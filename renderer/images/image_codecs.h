@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What decodes and encodes image files: OpenImageIO, behind an interface that does not name it. It needs hundreds of
-// shared libraries, so the command line opens it as a module when the first image is read or written; tests and other
-// programs link it. What is common to both is this interface.
+// What decodes and encodes image files: OpenImageIO, for AVIF libavif, behind an interface that names neither. They
+// need hundreds of shared libraries, so the command line opens it as a module when the first image is read or written;
+// tests and other programs link it. What is common to both is this interface.
 #pragma once
 
 #include <memory>

@@ -8,6 +8,7 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
+#include "renderer/images/avif_reader.h"
 #include "renderer/images/image_codecs.h"
 
 namespace braid {
@@ -238,6 +239,7 @@ class OiioCodecs : public ImageCodecs {
 
   std::unique_ptr<ImageReader> openNamed(const std::string& name, const uint8_t* data, size_t bytes,
                                          std::string& error) const override {
+    if (data && isAvif(data, bytes)) return openAvif(data, bytes, error);
     const OIIO::ImageSpec hints = readingHints();
     auto memory = data ? std::make_unique<BoundedReader>(data, bytes) : nullptr;
     auto input = OIIO::ImageInput::create(name, false, &hints, memory.get());

@@ -27,7 +27,8 @@ enum TraitFlags : uint32_t {
   kTraitEnvironmentImage = 1u << 13,
   kTraitSmoothSpecular = 1u << 14,  // roughness < 0.1 on a metal, clearcoat or transmissive surface: may cast caustics
   kTraitUnlit = 1u << 15,
-  kTraitPanes = 1u << 16,  // light may go straight on through a surface: Material::mayBePane()
+  kTraitPanes = 1u << 16,       // light may go straight on through a surface: Material::mayBePane()
+  kTraitDispersion = 1u << 17,  // Material::disperses()
 };
 
 struct SceneTraits {

@@ -125,6 +125,8 @@ void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
   part(kTraitPanes, "shadow rays through panes", "thin smooth transmissive surfaces let light straight through",
        "no thin smooth transmissive surface");
   part(kTraitVolume, "media tracking", "closed solids refract or attenuate", "no solid with a volume");
+  part(kTraitDispersion, "dispersion", "paths follow one colour from the first dispersive surface on",
+       "no solid disperses light");
   part(kTraitInstances, "instance transforms",
        scene.moves() ? "meshes placed several times, or moved" : "meshes placed several times",
        "every mesh is placed once and lies in world space");

@@ -22,6 +22,7 @@ struct MaterialSummary {
   bool emissive = false, unlit = false, volume = false;
   bool pane = false;  // Material::mayBePane()
   bool ground = false;
+  bool disperses = false;
   bool special() const { return emissive || unlit || volume || ground; }
 };
 
@@ -33,7 +34,8 @@ struct TransportContext {
   explicit TransportContext(const Scene& s, LightStrategy strategy = LightStrategy::Automatic)
       : scene(s), lights(s, strategy) {
     for (const Material& m : s.materials())
-      materials.push_back({materialLobes(m), m.emissive(), m.unlit, m.hasVolume(), m.mayBePane(), m.isGround});
+      materials.push_back(
+          {materialLobes(m), m.emissive(), m.unlit, m.hasVolume(), m.mayBePane(), m.isGround, m.disperses()});
   }
   const MaterialSummary& summaryOf(const Hit& hit) const { return materials[hit.mesh->material]; }
 };

@@ -13,6 +13,12 @@
 
 namespace braid {
 
+// Which colour channel a path follows where dispersion makes it follow one (dispersion.h).
+struct PathChannel {
+  uint8_t index = 3;   // 3: the scene has no dispersion
+  bool split = false;  // the path carries this channel alone
+};
+
 class MediaStack {
  public:
   bool empty() const { return count_ == 0; }
@@ -86,10 +92,10 @@ inline float mediumIndex(const Scene& scene, const MediaStack& media) {
 }
 
 // Refractive index on the outside of a hit surface, for a path inside of `media`.
-inline float indexOutside(const Scene& scene, const MediaStack& media, const Hit& hit) {
+inline float indexOutside(const Scene& scene, const MediaStack& media, const Hit& hit, PathChannel channel = {}) {
   if (media.empty()) return 1;
   const int64_t medium = media.ruling(scene.materials(), hit.front ? -1 : static_cast<int64_t>(hit.mesh->material));
-  return medium < 0 ? 1.0f : scene.materials()[static_cast<size_t>(medium)].ior;
+  return medium < 0 ? 1.0f : scene.materials()[static_cast<size_t>(medium)].indexOf(channel.index);
 }
 
 // Whether the hit surface of a solid lies inside of another one that rules there: it scatters nothing, and rays go

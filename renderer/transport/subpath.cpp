@@ -74,6 +74,7 @@ void SubpathBatch::startCamera(uint64_t key, const Camera::CameraRay& ray, const
   s.direction = ray.direction;
   s.time = ray.time;
   s.media = media;
+  s.channel = channelOf(scene_, sampler_, key);
   s.byDistance = !orthographic;
   if (settings_.mis) s.mis.vcm = sqr(lightPaths / pdfPixel);  // (31)
 }
@@ -90,6 +91,7 @@ void SubpathBatch::startLight(uint64_t key, const LightStart& start, const Media
   s.throughput = start.throughput;
   s.startThroughput = maxComponent(start.throughput);
   s.media = media;
+  s.channel = channelOf(scene_, sampler_, key);
   s.byDistance = start.finite;
   s.light = start.light;
   s.pdfEmit = start.pdfEmit;

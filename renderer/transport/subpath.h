@@ -21,6 +21,7 @@
 #include "renderer/scene/camera.h"
 #include "renderer/transport/bsdf/bsdf.h"
 #include "renderer/transport/context.h"
+#include "renderer/transport/dispersion.h"
 #include "renderer/transport/light_emission.h"
 #include "renderer/transport/roulette.h"
 #include "renderer/transport/visibility.h"
@@ -81,6 +82,7 @@ struct SubpathState {
   Vec3 origin, direction;
   Spectrum throughput{1};
   MediaStack media;
+  PathChannel channel;
   MisQuantities mis;
   uint64_t key = 0;
   int segments = 1;  // including the ray that is under way
@@ -206,10 +208,11 @@ void SubpathBatch::run(const OnHit& onHit, const OnMiss& onMiss) {
       if (arrival == Arrival::Vertex) {
         const uint32_t lobes = context_.summaryOf(hit).lobes;
         const Vec3 wo = hit.frame.toLocal(hit.wo);
+        splitColours(context_, state.media, hit, state.channel, state.throughput);
         SubpathVertex vertex =
-            lobes == kLobeDiffuse ? SubpathVertex(baseColorAt(scene_, hit), wo)
-                                  : SubpathVertex(surfaceAt(scene_, hit, lobes, indexOutside(scene_, state.media, hit)),
-                                                  wo, settings_.transport);
+            lobes == kLobeDiffuse
+                ? SubpathVertex(baseColorAt(scene_, hit), wo)
+                : SubpathVertex(surfaceAt(scene_, hit, lobes, state.media, state.channel), wo, settings_.transport);
         vertex.mis = here;
         finishVertex(state, hit, vertex);
         Onward onward = onHit(index, state, vertex);

@@ -13,6 +13,12 @@ JPEG = ("/9j/4AAQSkZJRgABAQEASABIAAD/2wBDAAEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEB"
         "FAABAAAAAAAAAAAAAAAAAAAACv/EABQQAQAAAAAAAAAAAAAAAAAAAAD/2gAIAQEAAD8A"
         "fwf/2Q==")
 WEBP = "UklGRhoAAABXRUJQVlA4TA0AAAAvAAAAEAcQERGIiP4HAA=="
+AVIF = ("AAAAIGZ0eXBhdmlmAAAAAGF2aWZtaWYxbWlhZk1BMUIAAADybWV0YQAAAAAAAAAoaGRs"
+        "cgAAAAAAAAAAcGljdAAAAAAAAAAAAAAAAGxpYmF2aWYAAAAADnBpdG0AAAAAAAEAAAAe"
+        "aWxvYwAAAABEAAABAAEAAAABAAABGgAAABQAAAAoaWluZgAAAAAAAQAAABppbmZlAgAA"
+        "AAABAABhdjAxQ29sb3IAAAAAamlwcnAAAABLaXBjbwAAABRpc3BlAAAAAAAAAAIAAAAC"
+        "AAAAEHBpeGkAAAAAAwgICAAAAAxhdjFDgQAMAAAAABNjb2xybmNseAACAAIAAoAAAAAX"
+        "aXBtYQAAAAAAAAABAAEEAQKDBAAAABxtZGF0EgAKBRgANgQgMgkXgAkkkkQABUg=")
 # A KTX2 file with alpha, under zlib.
 ETC1S = ("eNpb7R0SoWBksJuXS4qLAQgYgZgDiHkYEIARCWcAsQ2S3AoofZoRQjcwQWhFBlQA08PE"
          "YMGwmJGRgZmZgUEALmsPZ/0HAiCfH5XPwMDKIMFgC6Tzgfg7mtlCUAzSpOCQGz1JJXJa"
@@ -37,6 +43,7 @@ def texture_seeds():
     yield "png", png(3, 2, lambda x, y: (x * 80, y * 120, 5))
     yield "jpeg", base64.b64decode(JPEG)
     yield "webp", base64.b64decode(WEBP)
+    yield "avif", base64.b64decode(AVIF)
     yield "hdr", hdr(4, 2)
     yield "hdr, runs", hdr(16, 2)
     yield "exr", write_exr(4, 2, lambda x, y: (x, math.inf, -1.0))

@@ -19,7 +19,7 @@ set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libdevel)
 set(CPACK_COMPONENT_LIBRARY_DESCRIPTION
     "library of the path tracer braid\n Headers and static libraries to load, plan, render and combine.")
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_DEPENDS
-    "libembree-dev, libopenimageio-dev, libimath-dev, libtbb-dev, libglm-dev, libboost-dev, libfmt-dev, libwebp-dev, nlohmann-json3-dev, libdraco-dev, libmeshoptimizer-dev, libutf8proc-dev")
+    "libembree-dev, libopenimageio-dev, libavif-dev, libimath-dev, libtbb-dev, libglm-dev, libboost-dev, libfmt-dev, libwebp-dev, nlohmann-json3-dev, libdraco-dev, libmeshoptimizer-dev, libutf8proc-dev")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-braid)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "braid, python3 (>= 3.11), python3 (<< 3.12), python3-numpy")

@@ -2,6 +2,8 @@
 // glTF metallic-roughness material with its extensions, as plain data. Factors are linear; textures multiply factors.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <string>
 
@@ -14,6 +16,8 @@ enum class AlphaMode : uint8_t { Opaque, Mask, Blend };
 
 // GGX alpha below which a surface is taken for smooth: a mirror, or a clear pane.
 inline constexpr float kSmoothAlpha = 1e-3f;
+
+inline constexpr float kLargestIor = 100;
 
 struct Material {
   std::string name;
@@ -42,8 +46,8 @@ struct Material {
   bool doubleSided = false;
   bool unlit = false;
 
-  float ior = 1.5f;  // 0 is legal: F = 1 (KHR_materials_ior)
-  float dispersion = 0;
+  float ior = 1.5f;      // 0 is legal: F = 1 (KHR_materials_ior)
+  float dispersion = 0;  // 20 / Abbe number
 
   float specular = 1;          // KHR_materials_specular
   TextureRef specularTexture;  // A
@@ -89,6 +93,15 @@ struct Material {
   bool emissive() const { return maxComponent(emission) > 0; }
   bool transmissive() const { return transmission > 0; }
   bool hasVolume() const { return !thinWalled && (transmissive() || diffuseTransmission > 0); }
+  bool disperses() const { return dispersion > 0 && ior > 1 && !thinWalled && transmissive() && !specularGlossiness; }
+  // Refractive index of a colour channel, by the formula of KHR_materials_dispersion for its lines C (656.3 nm, red),
+  // d (587.6 nm, green) and F (486.1 nm, blue). Without a channel (3), that of the line d.
+  float indexOf(unsigned channel) const {
+    constexpr std::array<float, 3> kSlope = {523655 / (656.3f * 656.3f) - 1.5168f, 0,
+                                             523655 / (486.1f * 486.1f) - 1.5168f};
+    if (channel >= kSlope.size() || !disperses()) return ior;
+    return std::clamp(ior + (ior - 1) * (dispersion / 20) * kSlope[channel], 1.0f, kLargestIor);
+  }
   // Whether light may go straight on through it somewhere: transmissive, thin, smooth.
   bool mayBePane() const {
     return transmissive() && thinWalled && !unlit && !specularGlossiness &&

@@ -13,8 +13,8 @@
 
 namespace braid::gltf {
 
-// The images that a texture names in formats that are supported: KTX2, then WebP, then any other, each if it is there.
-// The first that can be decoded is read.
+// The images that a texture names in formats that are supported: KTX2, then AVIF, then WebP, then any other, each if it
+// is there. The first that can be decoded is read.
 std::vector<int> imagesOf(const tinygltf::Texture& texture);
 
 class PixelBudget;

@@ -9,7 +9,6 @@ namespace braid::gltf {
 
 namespace {
 
-constexpr float kLargestIor = 100;
 constexpr double kLargest = std::numeric_limits<float>::max();
 
 Spectrum colour(const std::vector<double>& c, const Spectrum& fallback) {
@@ -142,9 +141,6 @@ class MaterialReader {
       m.ior = kLargestIor;
     }
     m.dispersion = factor(member(extensions, "KHR_materials_dispersion"), "dispersion", 0);
-    if (m.dispersion > 0)
-      document_.report.warn(place + "/extensions/KHR_materials_dispersion",
-                            "dispersion is not rendered; the material refracts all colours alike");
     const Value& specular = member(extensions, "KHR_materials_specular");
     m.specular = factor(specular, "specularFactor", 1);
     m.specularTexture = texture(specular, "specularTexture");
@@ -168,6 +164,9 @@ class MaterialReader {
                             "is not positive; no attenuation is used");
       m.attenuationDistance = kInfinity;
     }
+    if (m.dispersion > 0 && !m.disperses())
+      document_.report.warn(place + "/extensions/KHR_materials_dispersion",
+                            "dispersion needs transmission, a volume and an index above 1; it has no effect");
     const Value& diffuse = member(extensions, "KHR_materials_diffuse_transmission");
     m.diffuseTransmission = factor(diffuse, "diffuseTransmissionFactor", 0);
     m.diffuseTransmissionTexture = texture(diffuse, "diffuseTransmissionTexture");
@@ -211,6 +210,7 @@ class MaterialReader {
 
 std::vector<int> imagesOf(const tinygltf::Texture& texture) {
   std::vector<int> images = {index(member(texture.extensions, "KHR_texture_basisu"), "source"),
+                             index(member(texture.extensions, "EXT_texture_avif"), "source"),
                              index(member(texture.extensions, "EXT_texture_webp"), "source"), texture.source};
   std::erase_if(images, [](int image) { return image < 0; });
   return images;

@@ -62,10 +62,9 @@ class Texture {
   Filter filter_ = Filter::Linear;
 };
 
-// Decodes an encoded image (PNG, JPEG, WebP, HDR, EXR, …) held in memory, by OpenImageIO and libwebp, with unassociated
-// alpha: that of formats which store colours multiplied by it (EXR, some TIFF) is divided out. Colour profiles and
-// gamma chunks are ignored, as glTF demands. Throws Error(BadInput) with a one-line reason; refuses images over 2^28
-// pixels.
+// Decodes an encoded image (PNG, JPEG, WebP, AVIF, KTX2, HDR, EXR, …) held in memory, with unassociated alpha: that of
+// formats which store colours multiplied by it (EXR, some TIFF) is divided out. Colour profiles and gamma chunks are
+// ignored, as glTF demands. Throws Error(BadInput) with a one-line reason; refuses images over 2^28 pixels.
 std::shared_ptr<const Image> decodeImage(const uint8_t* data, size_t bytes, const std::string& name);
 
 // The same from a file, for environments: colours stay multiplied by alpha where the file has them so.

@@ -14,9 +14,9 @@ namespace {
 
 // Beside those of materials, which gltf_schema.cpp lists.
 constexpr std::array kRendered = {
-    "EXT_mesh_gpu_instancing", "EXT_meshopt_compression", "EXT_texture_webp",      "KHR_draco_mesh_compression",
-    "KHR_lights_punctual",     "KHR_materials_variants",  "KHR_mesh_quantization", "KHR_meshopt_compression",
-    "KHR_node_visibility",     "KHR_texture_basisu",      "KHR_texture_transform",
+    "EXT_mesh_gpu_instancing",    "EXT_meshopt_compression", "EXT_texture_avif",       "EXT_texture_webp",
+    "KHR_draco_mesh_compression", "KHR_lights_punctual",     "KHR_materials_variants", "KHR_mesh_quantization",
+    "KHR_meshopt_compression",    "KHR_node_visibility",     "KHR_texture_basisu",     "KHR_texture_transform",
 };
 
 // No pixel depends on them: metadata, feature ids, outlines, levels of detail beside the finest, interaction, sound,
@@ -91,8 +91,8 @@ void checkExtensions(Document& document, const nlohmann::json& root) {
   for (size_t i = 0; i < required.size(); ++i) {
     const std::string& name = required[i];
     const std::string place = "/extensionsRequired/" + std::to_string(i);
-    // Spreading colours and moving what is no node are not rendered: never silently.
-    if (name == "KHR_materials_dispersion" || (name == "KHR_animation_pointer" && document.options.frameTime))
+    // Moving what is no node is not rendered: never silently.
+    if (name == "KHR_animation_pointer" && document.options.frameTime)
       document.report.warn(place,
                            "extension " + quoted(name) + " is read but not rendered; the picture lacks its effect");
     if (isSupported(name)) continue;

@@ -175,7 +175,8 @@ constexpr Field kAccessor[] = {index("bufferView", "bufferViews", nullptr, nullp
 constexpr Field kImage[] = {text("name"), text("uri"), text("mimeType"), index("bufferView", "bufferViews")};
 constexpr Field kSampler[] = {whole("magFilter", 65535), wrap("wrapS"), wrap("wrapT")};
 constexpr Field kOtherImage[] = {index("source", "images")};
-constexpr Field kTextureObjectExtensions[] = {object("EXT_texture_webp", kOtherImage),
+constexpr Field kTextureObjectExtensions[] = {object("EXT_texture_avif", kOtherImage),
+                                              object("EXT_texture_webp", kOtherImage),
                                               object("KHR_texture_basisu", kOtherImage)};
 constexpr Field kTextureObject[] = {index("source", "images"), index("sampler", "samplers"),
                                     object("extensions", kTextureObjectExtensions)};
