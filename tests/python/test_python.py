@@ -215,6 +215,18 @@ class Combining(unittest.TestCase):
         self.assertLess(by["pw", 4], by["none", 4])
         self.assertGreater(by["black", 4], 0.1)
 
+    def test_a_function_is_in_a_sweep_of_the_command_line_and_its_report(self):
+        with tempfile.TemporaryDirectory() as folder:
+            mine = (f"external-command:{sys.executable} -m braid.external {EXAMPLES}/my_denoiser.py:cross_bilateral "
+                    "{color.pfm} {albedo.pfm} {normal.pfm} {out.pfm}")
+            subprocess.run([os.environ["BRAID"], "sweep", CORNELL, "-o", folder, "--size", "32x24", "--spp", "4",
+                            "--methods", f"pt,nfor,auto,{mine}", "--reference-spp", "64"], check=True, capture_output=True)
+            rows = (pathlib.Path(folder) / "sweep.csv").read_text().splitlines()
+            self.assertEqual(len(rows), 5)
+            self.assertEqual(sum("cross_bilateral" in row for row in rows), 1)
+            for report in ("summary.md", "report.html"):
+                self.assertIn("cross_bilateral", (pathlib.Path(folder) / report).read_text())
+
     def test_metrics_have_names(self):
         values = braid.compare(self.image, self.truth)
         self.assertEqual(set(values), set(braid.metrics))

@@ -20,7 +20,7 @@ set_target_properties(braid_python PROPERTIES PREFIX "" OUTPUT_NAME _braid SUFFI
                       VISIBILITY_INLINES_HIDDEN ON INTERPROCEDURAL_OPTIMIZATION OFF UNITY_BUILD OFF
                       LIBRARY_OUTPUT_DIRECTORY ${python_package})
 file(MAKE_DIRECTORY ${python_package})
-foreach(file __init__.py py.typed)
+foreach(file __init__.py external.py py.typed)
   file(CREATE_LINK ${CMAKE_SOURCE_DIR}/tools/python/braid/${file} ${python_package}/${file} SYMBOLIC)
 endforeach()
 # What networks need lies beside the module.
@@ -31,4 +31,4 @@ if(TARGET braid_onednn)
 endif()
 set(python_install lib/python3/dist-packages/braid)
 install(TARGETS braid_python DESTINATION ${python_install} COMPONENT python)
-install(FILES tools/python/braid/__init__.py tools/python/braid/py.typed DESTINATION ${python_install} COMPONENT python)
+install(FILES tools/python/braid/__init__.py tools/python/braid/external.py tools/python/braid/py.typed DESTINATION ${python_install} COMPONENT python)

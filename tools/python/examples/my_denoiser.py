@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A denoiser of ten lines against nfor and auto.   my_denoiser.py [SCENE]"""
+"""A denoiser of ten lines against nfor and auto.   my_denoiser.py [SCENE]
+
+In a sweep of the command line, with its row in the report:
+    braid sweep SCENE -o DIR --methods "pt,nfor,auto,external-command:python3 -m braid.external
+        my_denoiser.py:cross_bilateral {color.pfm} {albedo.pfm} {normal.pfm} {out.pfm}"
+"""
 import sys
 
 import numpy as np
@@ -20,12 +25,17 @@ def cross_bilateral(color, features):
     return total / weights
 
 
-scene = braid.load(sys.argv[1] if len(sys.argv) > 1 else "scenes/cornell.glb", size="96x54")
-methods = ["none", ("cross-bilateral", cross_bilateral), "nfor", "auto"]
-print(f"{'method':16} {'spp':>4} {'relL2':>9} {'seconds':>8}")
-for row in braid.sweep(scene, methods, spp=(4, 16), reference=256, integrator="pt"):
-    print(f"{row['method']:16} {row['spp']:4} {row['error']:9.5f} {row['seconds']:8.3f}")
+def main():
+    scene = braid.load(sys.argv[1] if len(sys.argv) > 1 else "scenes/cornell.glb", size="96x54")
+    methods = ["none", ("cross-bilateral", cross_bilateral), "nfor", "auto"]
+    print(f"{'method':16} {'spp':>4} {'relL2':>9} {'seconds':>8}")
+    for row in braid.sweep(scene, methods, spp=(4, 16), reference=256, integrator="pt"):
+        print(f"{row['method']:16} {row['spp']:4} {row['error']:9.5f} {row['seconds']:8.3f}")
 
-# As one of the images that auto chooses from.
-render = scene.render(spp=16, integrator="pt", combine="none")
-print("auto with it:", render.combine("auto", denoisers={"mine": cross_bilateral}).error)
+    # As one of the images that auto chooses from.
+    render = scene.render(spp=16, integrator="pt", combine="none")
+    print("auto with it:", render.combine("auto", denoisers={"mine": cross_bilateral}).error)
+
+
+if __name__ == "__main__":
+    main()
