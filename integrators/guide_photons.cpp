@@ -10,7 +10,7 @@ namespace braid {
 namespace {
 
 constexpr uint64_t kStream = 0x677068;
-constexpr size_t kPaths = size_t(1) << 17;
+constexpr size_t kPaths = size_t(1) << 16;
 constexpr size_t kMostOfPath = kMostGuidePhotons / kPaths;  // later ones tell little
 
 class PhotonWalks {

@@ -29,11 +29,15 @@ constexpr Round kRounds[] = {{2, false}, {4, true}, {2, false}, {4, true}};
 constexpr int kPasses = 12;
 constexpr ShareRange kLearning{0.25f, 0.75f};
 
-// Guided paths must promise so many times less variance x cost. Where light that comes straight from lamps is more than
-// the other share of the variance, there is nothing to promise.
-constexpr double kPays = 1.05, kHopeless = 0.9, kMostDirect = 0.85;
+// Guided paths must promise so many times less variance x cost. Trial passes are independent; low-discrepancy points
+// serve unguided paths better than guided ones, whose choices cut the points' patterns up.
+constexpr double kPays = 1.05, kPaysLowDiscrepancy = 1.5;
+// Below this after the first guided round, shares that are fitted do not make up for it.
+constexpr double kHopeless = 0.9;
+// Where light that comes straight from lamps is more than this share of the variance, there is nothing to promise.
+constexpr double kMostDirect = 0.85;
 // Of a shadow ray and of a guided vertex, in rays.
-constexpr double kShadowCost = 0.4, kGuidedCost = 0.4;
+constexpr double kShadowCost = 0.4, kGuidedCost = 0.5;
 // What counts as the brightness of a black pixel: this share of the mean.
 constexpr double kDarkest = 0.1;
 // Samples above this many times their pixel's brightness count as that.
@@ -219,8 +223,10 @@ class Training {
   Guide guide_;
 };
 
-// All rounds, or as many as it takes to see that nothing will come of it. `forced`: kept in any case.
-PlanLine train(Training& training, bool forced) {
+// All rounds, or as many as it takes to see that nothing will come of it.
+PlanLine train(Training& training, const Settings& settings) {
+  const bool forced = settings.guiding == Guiding::On;
+  const double pays = settings.sampler == SamplerKind::Sobol ? kPaysLowDiscrepancy : kPays;
   const auto line = [](bool kept, std::string reason) { return PlanLine{kept, "path guiding", std::move(reason)}; };
   for (const Round& round : kRounds) {
     training.run(round);
@@ -232,8 +238,9 @@ PlanLine train(Training& training, bool forced) {
     if (round.guided || first) training.learn(&round == std::end(kRounds) - 1 ? ShareRange{} : kLearning);
   }
   const double gain = training.gain(std::end(kRounds)[-1].passes);
-  if (!forced && gain < kPays)
-    return line(false, fmt::format("variance x cost would be {:.2f} times less, by {} paths", gain, training.paths()));
+  if (!forced && gain < pays)
+    return line(false, fmt::format("variance x cost would be {:.2f} times less by {} paths: {} times would pay", gain,
+                                   training.paths(), pays));
   const Guide& guide = training.guide();
   return line(true, fmt::format("variance x cost is {:.2f} times less, by {} paths: {} regions, {:.1f} MiB", gain,
                                 training.paths(), guide.regions(), static_cast<double>(guide.bytes()) / 1048576.0));
@@ -262,7 +269,7 @@ uint64_t guidingBytes(const Plan& plan) {
 GuidePreparation::GuidePreparation(const TransportContext& context, const Plan& plan) {
   if (!guidingApplies(plan).yes) return;
   Training training(context, plan);
-  decision_ = train(training, plan.settings.guiding == Guiding::On);
+  decision_ = train(training, plan.settings);
   if (decision_->kept) guide_ = training.take();
 }
 

@@ -17,6 +17,8 @@ namespace {
 
 constexpr int kMaxNullCrossings = 256;
 constexpr float kLeastGuidedScale = 1e-4f;
+// Later vertices carry too little for a guide to pay.
+constexpr int kGuidedSegments = 3;
 
 // The normal by which lights are chosen at a hit.
 const Vec3& receiverNormal(const Hit& hit, bool twoSided) { return twoSided ? hit.ng : hit.frame.n; }
@@ -122,7 +124,7 @@ bool PathKernel::scatter(PathState& path, const Hit& hit, const GuidedBsdf& bsdf
   if (!(sample.straight ? passPane(path, hit, sample.weight) : turn(path, hit, bsdf.bsdf(), twoSided, sample)))
     return false;
   if (!sample.delta) {
-    if (recorder_) recorder_->leave(static_cast<int>(&path - path_.data()), hit, path.direction, bsdf, sample);
+    if (recorder_) recorder_->leave(static_cast<int>(&path - path_.data()), hit, bsdf, sample);
     // Roulette takes the path for one that the BSDF has sampled: where the guide sends many, each carries little.
     if (bsdf.guided()) path.rouletteScale *= std::max(sample.bsdfPdfW / sample.pdfW, kLeastGuidedScale);
   }
@@ -310,7 +312,8 @@ bool PathKernel::shade(PathState& path, const Hit& hit, const SampleBlock& block
   if (path.segments >= plan_.settings.maxDepth) return passPane(path, hit, bsdf.straightTransmittance());
 
   const bool twoSided = (lobes & kTransmittingLobes) != 0;
-  const GuidedBsdf guided = guide_ && bsdf.hasNonDelta() ? GuidedBsdf(bsdf, *guide_, hit) : GuidedBsdf(bsdf);
+  const bool asks = guide_ && path.segments <= kGuidedSegments && bsdf.hasNonDelta();
+  const GuidedBsdf guided = asks ? GuidedBsdf(bsdf, *guide_, hit) : GuidedBsdf(bsdf);
   if (guided.guided()) ++guidedCount;
   if (bsdf.hasNonDelta()) {
     hasShadow = sampleLight(path, hit, guided, twoSided, block, shadow);

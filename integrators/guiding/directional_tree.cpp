@@ -72,60 +72,26 @@ class Builder {
 }  // namespace
 
 Vec2 squareOfDirection(const Vec3& w) {
-  const float angle = std::atan2(w.y, w.x) * (0.5f * kInvPi);
-  return glm::clamp(Vec2(0.5f * w.z + 0.5f, angle < 0 ? angle + 1 : angle), 0.0f, kOneMinusEpsilon);
+  const float x = std::fabs(w.x), y = std::fabs(w.y), sum = x + y;
+  float round = sum > 0 ? y / sum : 0.0f;  // in quadrants, from the x axis
+  if (w.x < 0) round = 2 - round;
+  if (w.y < 0) round = 4 - round;
+  return glm::clamp(Vec2(0.5f * w.z + 0.5f, 0.25f * round), 0.0f, kOneMinusEpsilon);
 }
 
 Vec3 directionOfSquare(const Vec2& p) {
-  const float z = 2 * p.x - 1, r = safeSqrt(1 - z * z), angle = 2 * kPi * p.y;
-  return {r * std::cos(angle), r * std::sin(angle), z};
+  float round = 4 * p.y;
+  const float signY = round > 2 ? -1.0f : 1.0f;
+  if (round > 2) round = 4 - round;
+  const float signX = round > 1 ? -1.0f : 1.0f;
+  if (round > 1) round = 2 - round;
+  const float z = 2 * p.x - 1, x = 1 - round, r = std::sqrt(std::max(1 - z * z, 0.0f) / (x * x + round * round));
+  return {signX * x * r, signY * round * r, z};
 }
 
-float DirectionalTrees::density(uint32_t root, Vec2 p) const {
-  float density = 1;
-  for (uint32_t index = root; index != 0;) {
-    const DirectionalNode& node = nodes_[index];
-    const auto q = static_cast<size_t>(quarterOf(p));
-    density *= 4 * node.share[q];
-    index = node.child[q];
-  }
-  return density;
-}
-
-Vec2 DirectionalTrees::sample(uint32_t root, Vec2 u, float& density) const {
-  // Chooses a half by its share and stretches what is left of the variate.
-  const auto choose = [](float lower, float& v) {
-    const bool upper = v >= lower;
-    v = upper ? (v - lower) / (1 - lower) : v / lower;
-    v = std::min(v, kOneMinusEpsilon);
-    return upper ? 1 : 0;
-  };
-  Vec2 corner(0);
-  float size = 1;
-  density = 1;
-  for (uint32_t index = root; index != 0;) {
-    const DirectionalNode& node = nodes_[index];
-    const auto& s = node.share;
-    const int x = choose(s[0] + s[2], u.x);
-    const float lower = s[static_cast<size_t>(x)], upper = s[static_cast<size_t>(x + 2)];
-    const int y = choose(lower / (lower + upper), u.y);
-    const auto q = static_cast<size_t>(x + 2 * y);
-    size *= 0.5f;
-    corner += size * Vec2(static_cast<float>(x), static_cast<float>(y));
-    density *= 4 * node.share[q];
-    index = node.child[q];
-  }
-  return glm::min(corner + size * u, Vec2(kOneMinusEpsilon));
-}
-
-uint32_t DirectionalTrees::add(const std::vector<DirectionalNode>& tree) {
-  const auto root = static_cast<uint32_t>(nodes_.size());
-  for (DirectionalNode node : tree) {
-    for (uint32_t& child : node.child)
-      if (child != 0) child += root;
-    nodes_.push_back(node);
-  }
-  return root;
+float squareStretch(const Vec3& w) {
+  const float flat = w.x * w.x + w.y * w.y, sum = std::fabs(w.x) + std::fabs(w.y);
+  return sum > 0 ? 0.5f * kPi * (flat / (sum * sum)) : 0.5f * kPi;
 }
 
 std::vector<DirectionalNode> buildDirectionalTree(std::vector<DirectionalPoint>& points) {
@@ -134,6 +100,64 @@ std::vector<DirectionalNode> buildDirectionalTree(std::vector<DirectionalPoint>&
   std::vector<DirectionalNode> nodes;
   Builder(nodes, total).build(points, 1, 0, nullptr);
   return nodes;
+}
+
+namespace {
+
+// Spreads the probability of a square of `size` cells over them.
+void spread(const std::vector<DirectionalNode>& tree, uint32_t index, float probability, std::array<int, 3> square,
+            DirectionalTable& table) {
+  const auto [left, top, size] = square;
+  const int half = size / 2;
+  for (size_t q = 0; half > 0 && q < 4; ++q) {
+    const float part = probability * tree[index].share[q];
+    const std::array<int, 3> quarter{left + static_cast<int>(q % 2) * half, top + static_cast<int>(q / 2) * half, half};
+    if (tree[index].child[q] != 0 && half > 1) {
+      spread(tree, tree[index].child[q], part, quarter, table);
+      continue;
+    }
+    constexpr float kCells = DirectionalTable::kSize * DirectionalTable::kSize;
+    const float density = part * kCells / static_cast<float>(half * half);
+    for (int y = quarter[1]; y < quarter[1] + half; ++y)
+      for (int x = quarter[0]; x < quarter[0] + half; ++x)
+        table.cell[static_cast<size_t>(y)][static_cast<size_t>(x)] = density;
+  }
+}
+
+// Fills in the cumulative shares of the weights; uniform ones where all are 0.
+float accumulate(const DirectionalTable::Line& weight, DirectionalTable::Line& end) {
+  float sum = 0;
+  for (size_t i = 0; i < weight.size(); ++i) end[i] = sum += weight[i];
+  for (size_t i = 0; i < weight.size(); ++i)
+    end[i] = sum > 0 ? end[i] / sum : static_cast<float>(i + 1) / static_cast<float>(weight.size());
+  end.back() = 1;
+  return sum;
+}
+
+// The interval that a variate falls into, which is stretched to [0, 1).
+size_t pickInterval(const DirectionalTable::Line& end, float& u) {
+  size_t i = 0;
+  for (size_t k = 0; k + 1 < end.size(); ++k) i += u >= end[k] ? 1u : 0u;
+  const float begin = i > 0 ? end[i - 1] : 0.0f;
+  u = std::clamp((u - begin) / (end[i] - begin), 0.0f, kOneMinusEpsilon);
+  return i;
+}
+
+}  // namespace
+
+DirectionalTable::DirectionalTable(const std::vector<DirectionalNode>& tree) {
+  spread(tree, 0, 1, {0, 0, kSize}, *this);
+  Line rows;
+  for (size_t y = 0; y < rows.size(); ++y) rows[y] = accumulate(cell[y], endOfCell[y]);
+  accumulate(rows, endOfRow);
+}
+
+Vec2 DirectionalTable::sample(const Vec2& u, float& density) const {
+  Vec2 within = u;
+  const size_t y = pickInterval(endOfRow, within.y), x = pickInterval(endOfCell[y], within.x);
+  density = cell[y][x];
+  const Vec2 corner(static_cast<float>(x), static_cast<float>(y));
+  return glm::min((corner + within) / static_cast<float>(kSize), Vec2(kOneMinusEpsilon));
 }
 
 }  // namespace braid

@@ -14,13 +14,13 @@ namespace braid {
 inline constexpr int kGuideClasses = 12;
 int guideClass(const Vec3& normal, bool narrow);
 
-// Directions of a class as its trees have them: z is the axis of its normals.
+// Directions of a class as its densities have them: z is the axis of its normals.
 Vec3 toGuideAxes(int guideClass, const Vec3& w);
 Vec3 fromGuideAxes(int guideClass, const Vec3& w);
 
 struct GuideRegion {
-  uint32_t root = 0;  // of DirectionalTrees; 0: uniform
-  float share = 0;    // of the guide in what is sampled; 0: the BSDF alone
+  uint32_t table = 0;  // of Guide::table()
+  float share = 0;     // of the guide in what is sampled; 0: the BSDF alone
 };
 
 // A tree of planes at right angles to the axes over one class of surfaces. Children lie beside each other.
@@ -40,10 +40,11 @@ class Guide {
     const GuideRegion& region = regions_[leafOf(guideClass, position)];
     return region.share > 0 ? &region : nullptr;
   }
-  const DirectionalTrees& trees() const { return trees_; }
+  const DirectionalTable& table(const GuideRegion& region) const { return tables_[region.table]; }
   size_t regions() const { return regions_.size() - 1; }
   size_t bytes() const {
-    return trees_.bytes() + nodes_.size() * sizeof(SpatialNode) + regions_.size() * sizeof(GuideRegion);
+    return tables_.size() * sizeof(DirectionalTable) + nodes_.size() * sizeof(SpatialNode) +
+           regions_.size() * sizeof(GuideRegion);
   }
 
  private:
@@ -60,7 +61,7 @@ class Guide {
   std::array<uint32_t, kGuideClasses> root_;
   std::vector<SpatialNode> nodes_{SpatialNode{}};
   std::vector<GuideRegion> regions_{GuideRegion{}};  // the first one: nothing was learned
-  DirectionalTrees trees_;
+  std::vector<DirectionalTable> tables_;
 };
 
 }  // namespace braid

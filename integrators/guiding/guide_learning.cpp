@@ -2,6 +2,7 @@
 // From photons and records to a guide: the surfaces of a class are cut at medians until a region holds few photons;
 // they give its density, and the records of paths that met it its share.
 #include <algorithm>
+#include <optional>
 
 #include "integrators/guiding/guide_record.h"
 #include "renderer/core/parallel.h"
@@ -79,14 +80,16 @@ class GuideBuilder {
 
   Guide fit(std::span<const GuideRecord> records, std::span<const float> scale) {
     sortTrials(records, scale);
-    std::vector<std::vector<DirectionalNode>> trees(leaves_.size());
+    std::vector<std::optional<DirectionalTable>> tables(leaves_.size());
     std::vector<float> shares(leaves_.size());
     parallelFor(leaves_.size(), [&](size_t i) {
       shares[i] = share(leaves_[i]);
-      if (shares[i] > 0) trees[i] = density(leaves_[i]);
+      if (shares[i] > 0) tables[i].emplace(density(leaves_[i]));
     });
-    for (size_t i = 0; i < leaves_.size(); ++i)
-      guide_.regions_.push_back({shares[i] > 0 ? guide_.trees_.add(trees[i]) : 0, shares[i]});
+    for (size_t i = 0; i < leaves_.size(); ++i) {
+      guide_.regions_.push_back({static_cast<uint32_t>(guide_.tables_.size()), shares[i]});
+      if (tables[i]) guide_.tables_.push_back(*tables[i]);
+    }
     return std::move(guide_);
   }
 

@@ -3,14 +3,12 @@
 
 namespace braid {
 
-void PathRecorder::leave(int i, const Hit& hit, const Vec3& direction, const GuidedBsdf& bsdf,
-                         const GuidedSample& sample) {
+void PathRecorder::leave(int i, const Hit& hit, const GuidedBsdf& bsdf, const GuidedSample& sample) {
   Vertices& path = vertices_[static_cast<size_t>(i)];
   if (path.count == kMostVertices) return;
   GuideRecord& record = path.record[path.count++];
   const int surface = guideClass(hit.ng, GuidedBsdf::isNarrow(bsdf.bsdf()));
   record.position = hit.position;
-  record.place = squareOfDirection(toGuideAxes(surface, direction));
   record.pdfW = sample.pdfW;
   record.bsdfPdfW = sample.bsdfPdfW;
   record.guidePdfW = sample.guidePdfW;

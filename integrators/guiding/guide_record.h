@@ -13,7 +13,6 @@ namespace braid {
 
 struct GuideRecord {
   Vec3 position;
-  Vec2 place;  // the direction that the path took, on the square of its class
   float pdfW, bsdfPdfW, guidePdfW;
   float value;  // what the direction brought to the pixel: throughput · light / pdfW, mean of the channels
   uint32_t pixel : 27;
@@ -28,7 +27,7 @@ class PathRecorder {
 
   void begin() { vertices_.fill(Vertices{}); }
   // Path i scatters at a surface, by no delta lobe.
-  void leave(int i, const Hit& hit, const Vec3& direction, const GuidedBsdf& bsdf, const GuidedSample& sample);
+  void leave(int i, const Hit& hit, const GuidedBsdf& bsdf, const GuidedSample& sample);
   // Path i has arrived at what its ray met, and found `radiance` until now.
   void arrive(int i, const Spectrum& radiance) {
     Vertices& path = vertices_[static_cast<size_t>(i)];

@@ -10,8 +10,8 @@ constexpr float kUniformSphere = 0.25f * kInvPi;
 }  // namespace
 
 float GuidedBsdf::guidePdf(const Vec3& wi) const {
-  const Vec2 place = squareOfDirection(toGuideAxes(class_, frame_->toWorld(wi)));
-  return nonDelta_ * kUniformSphere * trees_->density(region_->root, place);
+  const Vec3 w = toGuideAxes(class_, frame_->toWorld(wi));
+  return nonDelta_ * kUniformSphere * squareStretch(w) * table_->density(squareOfDirection(w));
 }
 
 bool GuidedBsdf::sample(const SampleBlock& block, GuidedSample& out) const {
@@ -28,12 +28,12 @@ bool GuidedBsdf::sample(const SampleBlock& block, GuidedSample& out) const {
     return true;
   }
   float density = 1;
-  const Vec2 place = trees_->sample(region_->root, u, density);
-  out.wi = frame_->toLocal(fromGuideAxes(class_, directionOfSquare(place)));
+  const Vec3 w = directionOfSquare(table_->sample(u, density));
+  out.wi = frame_->toLocal(fromGuideAxes(class_, w));
   const BsdfValue value = bsdf_.evaluate(out.wi);
   if (isBlack(value.f)) return false;
   out.bsdfPdfW = value.pdfW;
-  out.guidePdfW = nonDelta_ * kUniformSphere * density;
+  out.guidePdfW = nonDelta_ * kUniformSphere * squareStretch(w) * density;
   out.pdfW = mixed(out.bsdfPdfW, out.guidePdfW);
   if (!(out.pdfW > 0)) return false;
   out.weight = value.f / out.pdfW;

@@ -26,8 +26,9 @@ class GuidedBsdf {
   GuidedBsdf(const Bsdf& bsdf, const Guide& guide, const Hit& hit) : bsdf_(bsdf), frame_(&hit.frame) {
     class_ = guideClass(hit.ng, isNarrow(bsdf));
     region_ = guide.find(class_, hit.position);
-    trees_ = &guide.trees();
-    if (region_) nonDelta_ = 1 - bsdf.deltaShare();
+    if (!region_) return;
+    table_ = &guide.table(*region_);
+    nonDelta_ = 1 - bsdf.deltaShare();
   }
 
   static bool isNarrow(const Bsdf& bsdf) { return bsdf.broadShare() < 0.5f; }
@@ -52,7 +53,7 @@ class GuidedBsdf {
   const Bsdf& bsdf_;
   const Frame* frame_ = nullptr;
   const GuideRegion* region_ = nullptr;
-  const DirectionalTrees* trees_ = nullptr;
+  const DirectionalTable* table_ = nullptr;
   int class_ = 0;
   float nonDelta_ = 1;
 };
