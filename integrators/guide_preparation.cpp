@@ -29,9 +29,8 @@ constexpr Round kRounds[] = {{2, false}, {4, true}, {2, false}, {4, true}};
 constexpr int kPasses = 12;
 constexpr ShareRange kLearning{0.25f, 0.75f};
 
-// Guided paths must promise so many times less variance x cost. Trial passes are independent; low-discrepancy points
-// serve unguided paths better than guided ones, whose choices cut the points' patterns up.
-constexpr double kPays = 1.05, kPaysLowDiscrepancy = 1.5;
+// Guided paths must promise so many times less variance x cost.
+constexpr double kPays = 1.05;
 // Below this after the first guided round, shares that are fitted do not make up for it.
 constexpr double kHopeless = 0.9;
 // Where light that comes straight from lamps is more than this share of the variance, there is nothing to promise.
@@ -226,7 +225,6 @@ class Training {
 // All rounds, or as many as it takes to see that nothing will come of it.
 PlanLine train(Training& training, const Settings& settings) {
   const bool forced = settings.guiding == Guiding::On;
-  const double pays = settings.sampler == SamplerKind::Sobol ? kPaysLowDiscrepancy : kPays;
   const auto line = [](bool kept, std::string reason) { return PlanLine{kept, "path guiding", std::move(reason)}; };
   for (const Round& round : kRounds) {
     training.run(round);
@@ -238,9 +236,9 @@ PlanLine train(Training& training, const Settings& settings) {
     if (round.guided || first) training.learn(&round == std::end(kRounds) - 1 ? ShareRange{} : kLearning);
   }
   const double gain = training.gain(std::end(kRounds)[-1].passes);
-  if (!forced && gain < pays)
+  if (!forced && gain < kPays)
     return line(false, fmt::format("variance x cost would be {:.2f} times less by {} paths: {} times would pay", gain,
-                                   training.paths(), pays));
+                                   training.paths(), kPays));
   const Guide& guide = training.guide();
   return line(true, fmt::format("variance x cost is {:.2f} times less, by {} paths: {} regions, {:.1f} MiB", gain,
                                 training.paths(), guide.regions(), static_cast<double>(guide.bytes()) / 1048576.0));
@@ -253,6 +251,10 @@ Applies guidingApplies(const Plan& plan) {
   if (s.guiding == Guiding::Off) return {false, "on request"};
   if (s.maxDepth < 3) return {false, "paths scatter once at most"};
   if (s.guiding == Guiding::On) return {true, "on request"};
+  // TRAP: trial passes are independent. These points serve unguided paths so much better than guided ones, whose choices
+  // cut their patterns up, that a promise by independent ones is not kept.
+  if (s.sampler == SamplerKind::Sobol)
+    return {false, "with Sobol' points it has not paid on any scene (--guiding on, or --sampler independent)"};
   if (static_cast<uint64_t>(s.width) * static_cast<uint64_t>(s.height) < kFewestPixels)
     return {false,
             fmt::format("the frame has fewer than {} pixels: learning would cost more than them", kFewestPixels)};

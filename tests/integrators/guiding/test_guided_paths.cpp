@@ -178,6 +178,10 @@ TEST_CASE("guided paths: left out where there is nothing to learn or to gain") {
   shortPaths.maxDepth = 2;
   CHECK_FALSE(guidingApplies(makePlan(box, box.data().cameras[0], shortPaths, integrators())).yes);
   CHECK_FALSE(guidingApplies(makePlan(box, box.data().cameras[0], guided(large, Guiding::Off), integrators())).yes);
+  Settings sobol = large;
+  sobol.guiding = Guiding::Automatic;
+  sobol.sampler = SamplerKind::Sobol;
+  CHECK_FALSE(guidingApplies(makePlan(box, box.data().cameras[0], sobol, integrators())).yes);
 }
 
 TEST_CASE("guided paths: scenes of any size and brightness are guided alike") {
