@@ -225,7 +225,10 @@ constexpr Field kSkin[] = {indices("joints", "nodes", "list the nodes that move 
 constexpr Field kAnimationSampler[] = {index("input", "accessors", "write the accessor of the key times", "-1"),
                                        index("output", "accessors", "write the accessor of the key values", "-1"),
                                        word("interpolation", "LINEAR, STEP, CUBICSPLINE")};
+constexpr Field kPointer[] = {text("pointer")};
+constexpr Field kTargetExtensions[] = {object("KHR_animation_pointer", kPointer)};
 constexpr Field kTarget[] = {{.name = "node", .kind = Kind::Index, .of = "nodes", .fallback = "-1"},
+                             object("extensions", kTargetExtensions),
                              word("path", "translation, rotation, scale, weights, pointer",
                                   "write translation, rotation, scale or weights", "\"\"")};
 constexpr Field kChannel[] = {index("sampler", "samplers of this animation", "write the index of a sampler", "-1"),
