@@ -128,7 +128,7 @@ constexpr Field kMeshopt[] = {index("buffer", "buffers", "write the index of the
                               whole("byteStride", 256, "write the size of one element"),
                               whole("count", kMostSize, "write the number of elements"),
                               word("mode", "ATTRIBUTES, TRIANGLES, INDICES", "write ATTRIBUTES, TRIANGLES or INDICES"),
-                              word("filter", "NONE, OCTAHEDRAL, QUATERNION, EXPONENTIAL")};
+                              word("filter", "NONE, OCTAHEDRAL, QUATERNION, EXPONENTIAL, COLOR")};
 constexpr Field kViewExtensions[] = {object("EXT_meshopt_compression", kMeshopt),
                                      object("KHR_meshopt_compression", kMeshopt)};
 constexpr Field kView[] = {index("buffer", "buffers", "write the index of a buffer", "-1"),
