@@ -84,6 +84,11 @@ inline SurfaceParameters withFilm(SurfaceParameters p, float thickness, float io
   return p;
 }
 
+inline SurfaceParameters withMultiScatter(SurfaceParameters p) {
+  p.lobes |= kLobeMultiScatter;
+  return p;
+}
+
 inline SurfaceParameters withDiffuseTransmission(SurfaceParameters p, float amount) {
   p.lobes |= kLobeDiffuseTransmission;
   p.diffuseTransmission = amount;
@@ -104,7 +109,16 @@ inline std::vector<BsdfCase> bsdfCases() {
     cases.push_back({"thin glass" + at, thinGlass(r)});
     cases.push_back({"sheen" + at, withSheen(lambert(Spectrum(0)), r)});
     cases.push_back({"clearcoat" + at, withClearcoat(lambert(Spectrum(0)), r)});
+    if (r < 0.1f) continue;
+    cases.push_back({"multi-scatter metal" + at, withMultiScatter(metal(r))});
+    cases.push_back({"multi-scatter glass entering" + at, withMultiScatter(glass(r, true))});
+    cases.push_back({"multi-scatter glass leaving" + at, withMultiScatter(glass(r, false))});
+    cases.push_back({"multi-scatter thin glass" + at, withMultiScatter(thinGlass(r))});
   }
+  cases.push_back({"multi-scatter half metal", withMultiScatter(metal(0.7f, 0.5f))});
+  cases.push_back({"multi-scatter milky glass", withMultiScatter(glass(0.6f, true, 1.5f, 0.5f))});
+  cases.push_back({"multi-scatter brushed metal", withMultiScatter(withAnisotropy(metal(0.4f), 0.6f, 0.7f))});
+  cases.push_back({"multi-scatter oil on metal", withMultiScatter(withFilm(metal(0.6f), 800, 1.8f))});
   cases.push_back({"half metal", metal(0.3f, 0.5f)});
   cases.push_back({"dense glass leaving", glass(0.3f, false, 2.4f)});
   cases.push_back({"milky glass entering", glass(0.3f, true, 1.5f, 0.5f)});

@@ -7,6 +7,7 @@
 
 #include "renderer/transport/bsdf/bsdf.h"
 #include "tests/support/bsdf_cases.h"
+#include "tests/support/sampled_albedo.h"
 #include "tests/support/statistics/chi_squared.h"
 
 namespace braid::test_bsdf {
@@ -16,31 +17,6 @@ using namespace test;
 namespace {
 
 Vec3 exchangedDirection(const Vec3& wo, const Vec3& wi) { return wi.z > 0 ? wo : mirrored(wo); }
-
-struct Albedo {
-  glm::dvec3 mean{0}, error{0};  // of the estimate, and its standard error
-  float largestWeight = 0;
-};
-
-// Stratified in the two dimensions of direction.
-Albedo sampledAlbedo(const Bsdf& bsdf, int side, bool withDelta, Rng& rng) {
-  glm::dvec3 sum(0), sum2(0);
-  Albedo a;
-  for (int i = 0; i < side * side; ++i) {
-    BsdfSample s;
-    const Vec2 cell(static_cast<float>(i % side), static_cast<float>(i / side));
-    const float uLobe = rng.next();
-    if (!bsdf.sample(uLobe, (cell + rng.next2()) / static_cast<float>(side), s) || (s.delta && !withDelta)) continue;
-    const glm::dvec3 w(s.weight);
-    sum += w;
-    sum2 += w * w;
-    a.largestWeight = std::max(a.largestWeight, maxComponent(s.weight));
-  }
-  const double n = side * side;
-  a.mean = sum / n;
-  a.error = glm::sqrt(glm::max(sum2 / n - a.mean * a.mean, 0.0) / n);
-  return a;
-}
 
 }  // namespace
 
@@ -170,6 +146,9 @@ TEST_CASE("bsdf: no more light leaves than arrives") {
       add("coated glass", withClearcoat(withSheen(glass(r, entering), r, white), r));
       add("filmed glass", withFilm(glass(r, entering, 1.5f, 0.5f), 500));
     }
+    for (const float m : {0.0f, 0.4f, 1.0f}) add("multi-scatter metallic", withMultiScatter(metal(r, m)));
+    add("multi-scatter brushed", withMultiScatter(withAnisotropy(metal(r), 0.7f, 0.3f)));
+    add("multi-scatter oil on metal", withMultiScatter(withFilm(metal(r), 800, 1.8f)));
     add("thin", withDiffuseTransmission(thinGlass(r, 0.5f), 0.5f));
     add("sheen", withSheen(lambert(), r, white));
     add("sheen over plastic", withSheen(plastic(0.5f), r, white));
@@ -246,6 +225,7 @@ TEST_CASE("bsdf: every extreme stays finite and non-negative") {
                             kLobeTransmission,
                             kLobeDiffuse | kLobeSpecular | kLobeSpecularGlossiness,
                             0xffu,
+                            0xffu | kLobeMultiScatter,
                             kLobeDiffuse | kLobeSpecular | kLobeSheen | kLobeClearcoat | kLobeDiffuseTransmission,
                             0};
   for (const uint32_t set : lobes) {

@@ -54,6 +54,7 @@ SurfaceParameters parametersOf(const Material& m) {
   p.baseColor = m.baseColor;
   p.metallic = m.metallic;
   p.roughness = m.roughness;
+  if (m.multiScatter && m.losesToRoughness()) p.lobes |= kLobeMultiScatter;
   if (m.clearcoat > 0) p.lobes |= kLobeClearcoat;
   p.clearcoat = m.clearcoat;
   p.clearcoatRoughness = m.clearcoatRoughness;

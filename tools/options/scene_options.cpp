@@ -25,6 +25,7 @@ const std::vector<std::pair<std::string, Guiding>> kGuidings{
 
 const std::vector<std::pair<std::string, DefaultLight>> kDefaultLights{
     {"studio", DefaultLight::Studio}, {"dome", DefaultLight::Dome}, {"none", DefaultLight::None}};
+const std::vector<std::pair<std::string, bool>> kOnOff{{"on", true}, {"off", false}};
 
 void addViewOptions(CLI::App& command, SceneChoice& c) {
   addSize(command, c.size, "Full frame in pixels");
@@ -96,6 +97,10 @@ void addLoadOptions(CLI::App& command, SceneChoice& c) {
       ->allow_extra_args(false)
       ->type_name("NAME");
   command.add_flag("--double-sided", c.load.doubleSided, "Treat every material as double-sided");
+  addNamed(
+      command, "--multi-scatter", c.load.multiScatter, {"choice", kOnOff},
+      "on: rough metals and rough glass keep the light that glTF's reference, of single scattering, loses; off: as "
+      "the reference");
   command.add_flag("--full", c.full, "Leave nothing out that the scene does not need (same pixels, for checking)");
   addIsa(command, c.isa);
 }

@@ -39,6 +39,7 @@ std::vector<StateOption> sceneIdentity(const SceneChoice& c, const SceneData& da
           {"--shutter", fmt::format("{}", c.load.shutter)},
           {"--animation", c.load.animation},
           {"--double-sided", yesOrNo(c.load.doubleSided)},
+          {"--multi-scatter", yesOrNo(c.load.multiScatter)},
           {"--default-light", toString(c.defaultLight)},
           {"the default light", yesOrNo(data.defaultLight)},
           {"--ground", yesOrNo(c.ground)},

@@ -19,6 +19,7 @@ enum LobeFlags : uint32_t {
   kLobeIridescence = 1u << 6,         // modifies the specular Fresnel term
   kLobeAnisotropy = 1u << 7,          // modifies the specular distribution
   kLobeSpecularGlossiness = 1u << 8,  // dielectric F0 given directly (specularF0), metallic is 0
+  kLobeMultiScatter = 1u << 9,        // modifies the rough specular lobe: it keeps what single scattering loses
 };
 
 // A surface with one of these is lit from both sides.
@@ -57,6 +58,8 @@ inline constexpr LobeEntry kLobeTable[] = {
      "no thin film"},
     {kLobeAnisotropy, [](const Material& m) { return m.anisotropy != 0; }, "anisotropy", "anisotropy",
      "anisotropic materials", "no anisotropic material"},
+    {kLobeMultiScatter, [](const Material& m) { return m.multiScatter && m.losesToRoughness(); }, "multi-scatter",
+     "multi-scatter", "rough metals and glass keep what single scattering loses", "no rough metal and no rough glass"},
 };
 
 // All lobes that a material can have anywhere on a surface.

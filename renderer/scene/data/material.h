@@ -90,6 +90,8 @@ struct Material {
   float iridescenceThicknessMax = 400;
   TextureRef iridescenceThicknessTexture;  // G
 
+  bool multiScatter = true;  // light that leaves a rough surface after several microfacets is not lost
+
   bool emissive() const { return maxComponent(emission) > 0; }
   bool transmissive() const { return transmission > 0; }
   bool hasVolume() const { return !thinWalled && (transmissive() || diffuseTransmission > 0); }
@@ -106,6 +108,10 @@ struct Material {
   bool mayBePane() const {
     return transmissive() && thinWalled && !unlit && !specularGlossiness &&
            (metallicRoughnessTexture || (metallic < 1 && roughness * roughness < kSmoothAlpha));
+  }
+  // Whether single scattering would lose light somewhere: on rough metals and rough transmissive dielectrics.
+  bool losesToRoughness() const {
+    return !unlit && !specularGlossiness && (metallic > 0 || transmissive()) && roughness * roughness >= kSmoothAlpha;
   }
   bool mayBeDielectric() const { return metallic < 1 || metallicRoughnessTexture; }
   // Whether something is left somewhere for the lobes below the specular ones.

@@ -54,12 +54,20 @@ struct SceneFile::Opened {
   std::set<std::string> told;
   // What poses change, as the file has it.
   std::vector<tinygltf::Node> nodes;
+  std::vector<Material> materials;
+  std::vector<CameraData> cameras;
+  std::vector<PunctualLight> lights;
   Report report;
   Usage usage;
   ContentHash hash;
 
   void restore() {
     document.model.nodes = nodes;
+    if (!document.properties.empty()) {
+      document.materials = materials;
+      document.cameras = cameras;
+      document.lights = lights;
+    }
     document.report = report;
     document.usage = usage;
     document.hash = hash;
@@ -78,9 +86,13 @@ SceneFile::SceneFile(const std::string& path, const LoadOptions& options, const 
   resolveViews(document);
   readMaterials(document);
   readCamerasAndLights(document);
+  resolvePointers(document);
   validate(document);
   opened_->log = log;
   opened_->nodes = document.model.nodes;
+  opened_->materials = document.materials;
+  opened_->cameras = document.cameras;
+  opened_->lights = document.lights;
   opened_->report = document.report;
   opened_->usage = document.usage;
   opened_->hash = document.hash;
@@ -94,6 +106,7 @@ SceneData SceneFile::pose(std::optional<float> frameTime) {
   document.options.frameTime = frameTime;
   const LoadOptions& options = document.options;
   SceneData scene = describe(document);
+  animateProperties(document);
   MaterialTable materials(document, scene, options.doubleSided);
   buildScene(document, options, materials, scene);
   materials.loadTextures();

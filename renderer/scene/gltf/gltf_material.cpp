@@ -216,18 +216,22 @@ std::vector<int> imagesOf(const tinygltf::Texture& texture) {
   return images;
 }
 
+Material readMaterial(Document& document, const tinygltf::Material& source, size_t index) {
+  Material material = MaterialReader(document).read(source, "/materials/" + std::to_string(index));
+  if (material.name.empty()) material.name = "material " + std::to_string(index);
+  return material;
+}
+
 void readMaterials(Document& document) {
   const std::vector<tinygltf::Material>& list = document.model.materials;
-  MaterialReader reader(document);
   for (size_t i = 0; i < document.model.textures.size(); ++i) {
     if (imagesOf(document.model.textures[i]).empty())
       document.report.warn(
           "/textures/" + std::to_string(i),
-          "has no image in a format that is supported (PNG, JPEG, WebP, KTX2); factors alone are used");
+          "has no image in a format that is supported (PNG, JPEG, WebP, AVIF, KTX2); factors alone are used");
   }
   for (size_t i = 0; i < list.size(); ++i) {
-    document.materials.push_back(reader.read(list[i], "/materials/" + std::to_string(i)));
-    if (document.materials.back().name.empty()) document.materials.back().name = "material " + std::to_string(i);
+    document.materials.push_back(readMaterial(document, list[i], i));
   }
   // What tinygltf holds of materials is large and read by now.
   document.model.materials = {};

@@ -44,8 +44,9 @@ void readCone(Report& report, const std::string& place, const tinygltf::SpotLigh
   light.innerConeAngle = light.outerConeAngle * 0.999f;
 }
 
-CameraData readCamera(Document& document, int index) {
-  const tinygltf::Camera& source = document.model.cameras[static_cast<size_t>(index)];
+}  // namespace
+
+CameraData readCamera(Document& document, const tinygltf::Camera& source, size_t index) {
   const std::string place = "/cameras/" + std::to_string(index) + '/' + source.type;
   CameraData camera;
   camera.name = source.name;
@@ -59,8 +60,7 @@ CameraData readCamera(Document& document, int index) {
   return camera;
 }
 
-PunctualLight readLight(Document& document, int index) {
-  const tinygltf::Light& source = document.model.lights[static_cast<size_t>(index)];
+PunctualLight readLight(Document& document, const tinygltf::Light& source, size_t index) {
   const std::string place = "/extensions/KHR_lights_punctual/lights/" + std::to_string(index);
   Report& report = document.report;
   PunctualLight light;
@@ -86,13 +86,11 @@ PunctualLight readLight(Document& document, int index) {
   return light;
 }
 
-}  // namespace
-
 void readCamerasAndLights(Document& document) {
   for (size_t i = 0; i < document.model.cameras.size(); ++i)
-    document.cameras.push_back(readCamera(document, static_cast<int>(i)));
+    document.cameras.push_back(readCamera(document, document.model.cameras[i], i));
   for (size_t i = 0; i < document.model.lights.size(); ++i)
-    document.lights.push_back(readLight(document, static_cast<int>(i)));
+    document.lights.push_back(readLight(document, document.model.lights[i], i));
 }
 
 }  // namespace braid::gltf

@@ -96,6 +96,7 @@ uint32_t MaterialTable::use(int fileMaterial) {
     document_.usage.mark("materials", fileMaterial);
   }
   material.doubleSided |= doubleSided_;
+  material.multiScatter = document_.options.multiScatter;
   dropUnreadTextures(material);
   forEachTexture(material, [&](TextureRef& ref, bool, bool) {
     if (!ref) return;

@@ -29,6 +29,7 @@ uint32_t SpecularLayer::init(const SurfaceParameters& p, uint32_t lobes, Transpo
   transmissionScale_ = transport == Transport::Radiance || !has(kLobeTransmission) ? 1.0f : sqr(eta_);
   if (!present()) smooth_ = passThrough_ = general_ = refractive_ = false;
   weighsDiffuse_ = present() && (has(kLobeDiffuse | kLobeDiffuseTransmission) || passThrough_);
+  initMultiScatter(p, transport);
   if (weighsDiffuse_) {
     row_ = ggxTableRow(ggx_.alphaX);
     rowAcross_ = has(kLobeAnisotropy) ? ggxTableRow(ggx_.alphaY) : row_;
@@ -85,6 +86,10 @@ void SpecularLayer::initDistribution(const SurfaceParameters& p) {
 void SpecularLayer::setDirection(const Vec3& wo) {
   wo_ = wo;
   stretchO_ = ggx_.stretch(toGgx(wo_));
+  if (has(kLobeMultiScatter)) {
+    if (metallic_ > 0) metalO_ = metalFactor(wo_.z);
+    if (transmissionShare_ > 0) glassO_ = 1 / glassAlbedo(glass_, wo_.z);
+  }
   if (!weighsDiffuse_) return;
   albedoO_ = ggxAlbedo(row_, wo_.z);
   const bool plain = !general_ && !has(kLobeAnisotropy);
@@ -94,6 +99,7 @@ void SpecularLayer::setDirection(const Vec3& wo) {
 void SpecularLayer::turn() {
   entering_ = !entering_;
   eta_ = 1 / eta_;
+  if (has(kLobeMultiScatter) && transmissionShare_ > 0) glass_ = glass_.otherSide();
   if (!weighsDiffuse_) return;
   std::swap(curve_[0], curve_[1]);
   std::swap(meanAlbedo_[0], meanAlbedo_[1]);
@@ -221,7 +227,7 @@ void SpecularLayer::addReflection(const Vec3& wi, float probability, BsdfValue& 
 // Cook & Torrance 1982 with the terms of microfacet.h. `probability`: of reflecting at this microfacet.
 void SpecularLayer::addReflection(const Facet& facet, float probability, BsdfValue& v) const {
   const float d = ggx_.D(facet.h), cosO = facet.o.z, cosI = facet.i.z;
-  v.f += facet.fresnel.reflect * (d * cosI * Ggx::visibility(cosO, stretchO_, cosI, ggx_.stretch(facet.i)));
+  v.f += reflectance(facet) * (d * cosI * Ggx::visibility(cosO, stretchO_, cosI, ggx_.stretch(facet.i)));
   v.pdfW += probability * 0.25f * Ggx::visibleNormals(d, cosO, stretchO_);
 }
 
@@ -247,7 +253,8 @@ void SpecularLayer::addTransmission(const Facet& facet, float probability, BsdfV
     density *= -oh * ih / sqr(oh + eta_ * ih);
     toSolidAngle = sqr(eta_);
   }
-  const float scale = refractive_ ? transmissionScale_ : toSolidAngle;
+  float scale = refractive_ ? transmissionScale_ : toSolidAngle;
+  if (has(kLobeMultiScatter)) scale *= glassFactor(facet.i.z);
   v.f += transmission_ * (facet.fresnel.base * density * g1 * scale);
   v.pdfW += probability * density * toSolidAngle;
 }

@@ -9,6 +9,7 @@
 #include "renderer/transport/bsdf/albedo_tables.h"
 #include "renderer/transport/bsdf/fresnel.h"
 #include "renderer/transport/bsdf/microfacet.h"
+#include "renderer/transport/bsdf/multi_scatter.h"
 #include "renderer/transport/bsdf/scattering.h"
 #include "renderer/transport/bsdf/surface.h"
 
@@ -72,10 +73,14 @@ class SpecularLayer {
   void initFresnel(const SurfaceParameters& p);
   void initDistribution(const SurfaceParameters& p);
   void initMeanAlbedo();
+  void initMultiScatter(const SurfaceParameters& p, Transport transport);
 
   Fresnel fresnel(float cosine) const;
   Fresnel fresnelGeneral(float cosine) const;
   float reflectProbability(const Fresnel& f) const;
+  Spectrum reflectance(const Facet& facet) const;
+  float metalFactor(float cosine) const;
+  float glassFactor(float cosineI) const;
   float dielectricAlbedo(const GgxAlbedo& e) const { return std::min(baseF0_ * e.f0 + baseF90_ * e.f90, 1.0f); }
   float dielectricAlbedo(int side, float cosine) const;
   Vec3 toGgx(const Vec3& w) const;
@@ -104,6 +109,15 @@ class SpecularLayer {
   float radianceScale_;  // 1/eta²
   float transmissionScale_;
   TableRow row_, rowAcross_;
+
+  // For kLobeMultiScatter only.
+  TableRow metalRow_, metalRowAcross_;
+  Spectrum metalScatter_;    // metallic_ times metalScatterColour()
+  float metalO_;             // the factor of wo
+  GlassPlace glass_;         // where transmissionShare_ > 0
+  float transmissionShare_;  // of the dielectric
+  float glassO_;             // the factor of wo
+  bool fromLight_;           // wi is on the camera's side
 
   // For general_ only.
   Spectrum dielectricF0_, metalF0_;

@@ -225,6 +225,24 @@ void runTinygltf(Document& document, const std::string& text, std::vector<std::v
   }
 }
 
+bool movesByPointer(const Json& animation) {
+  const auto channels = animation.find("channels");
+  return channels != animation.end() && std::any_of(channels->begin(), channels->end(), [](const Json& channel) {
+           const auto target = channel.find("target");
+           return target != channel.end() && target->value("path", "") == "pointer";
+         });
+}
+
+// What pointers of animations may lead to.
+void keepAnimatable(Document& document, const Json& root) {
+  const auto animations = root.find("animations");
+  if (animations == root.end() || std::none_of(animations->begin(), animations->end(), movesByPointer)) return;
+  Json kept = Json::object();
+  for (const char* name : {"materials", "cameras", "extensions"})
+    if (root.contains(name)) kept[name] = root[name];
+  document.animatable = std::make_shared<const Json>(std::move(kept));
+}
+
 }  // namespace
 
 void Document::useView(int view) {
@@ -271,6 +289,7 @@ void readDocument(Document& document, const std::string& path) {
   std::vector<std::vector<uint8_t>> buffers;
   takeSources(document, root, *bytes, buffers);
   mendJson(root, document.report);
+  keepAnimatable(document, root);
   const Json nodes = std::move(root["nodes"]);
   root.erase("nodes");
   const std::string text = root.dump();

@@ -61,6 +61,15 @@ struct DecodedImage {
   std::string problem, note;
 };
 
+// A property that a clip moves and that is no node's place: KHR_animation_pointer.
+struct AnimatedProperty {
+  int clip = 0, channel = 0;
+  std::string pointer;
+  size_t width = 1;  // numbers of a value
+  double low = 0, high = 0;
+  int visibleNode = -1;  // KHR_node_visibility of this node; the pointer is not needed
+};
+
 struct Document {
   std::string path;
   LoadOptions options;
@@ -75,6 +84,9 @@ struct Document {
   std::vector<CameraData> cameras;    // both without their nodes' transforms
   std::vector<PunctualLight> lights;
   std::vector<int> parents;  // of the nodes
+  // What pointers of animations lead to, and the checked JSON of materials, cameras and lights; null: nothing does.
+  std::vector<AnimatedProperty> properties;
+  std::shared_ptr<const nlohmann::json> animatable;
   // Accessors that primitives name but that cannot be read.
   std::map<const Primitive*, std::vector<int>> unreadable;
   std::vector<std::string> variants, extensionsIgnored;
@@ -94,14 +106,20 @@ struct Document {
 // required extension that is unknown.
 void readDocument(Document& document, const std::string& path);
 
-// tinygltf.cpp: what tinygltf makes of one node.
+// tinygltf.cpp: what tinygltf makes of one object.
 void parseNode(const nlohmann::json& json, tinygltf::Node& node);
+void parseMaterial(const nlohmann::json& json, tinygltf::Material& material);
+void parseCamera(const nlohmann::json& json, tinygltf::Camera& camera);
+void parseLight(const nlohmann::json& json, tinygltf::Light& light);
 
 // gltf_views.cpp: places every view inside its buffer and decompresses meshopt views.
 void resolveViews(Document& document);
 // gltf_material.cpp, gltf_optics.cpp: plain data; what is out of range is reported and replaced.
 void readMaterials(Document& document);
 void readCamerasAndLights(Document& document);
+Material readMaterial(Document& document, const tinygltf::Material& source, size_t index);
+CameraData readCamera(Document& document, const tinygltf::Camera& source, size_t index);
+PunctualLight readLight(Document& document, const tinygltf::Light& source, size_t index);
 // validate.cpp: what spans several objects. Afterwards every accessor is safe to read (broken ones have no elements)
 // and nodes form trees.
 void validate(Document& document);

@@ -14,13 +14,14 @@ namespace {
 
 // Beside those of materials, which gltf_schema.cpp lists.
 constexpr std::array kRendered = {
-    "EXT_mesh_gpu_instancing",    "EXT_meshopt_compression", "EXT_texture_avif",       "EXT_texture_webp",
-    "KHR_draco_mesh_compression", "KHR_lights_punctual",     "KHR_materials_variants", "KHR_mesh_quantization",
-    "KHR_meshopt_compression",    "KHR_node_visibility",     "KHR_texture_basisu",     "KHR_texture_transform",
+    "EXT_mesh_gpu_instancing", "EXT_meshopt_compression",    "EXT_texture_avif",    "EXT_texture_webp",
+    "KHR_animation_pointer",   "KHR_draco_mesh_compression", "KHR_lights_punctual", "KHR_materials_variants",
+    "KHR_mesh_quantization",   "KHR_meshopt_compression",    "KHR_node_visibility", "KHR_texture_basisu",
+    "KHR_texture_transform",
 };
 
 // No pixel depends on them: metadata, feature ids, outlines, levels of detail beside the finest, interaction, sound,
-// physics. KHR_animation_pointer moves what is not rendered at rest.
+// physics.
 constexpr std::array kHarmless = {
     "3DTILES_metadata",
     "AGI_articulations",
@@ -35,7 +36,6 @@ constexpr std::array kHarmless = {
     "EXT_structural_metadata",
     "FB_ngon_encoding",
     "GODOT_single_root",
-    "KHR_animation_pointer",
     "KHR_audio",
     "KHR_audio_emitter",
     "KHR_collision_shapes",
@@ -91,10 +91,6 @@ void checkExtensions(Document& document, const nlohmann::json& root) {
   for (size_t i = 0; i < required.size(); ++i) {
     const std::string& name = required[i];
     const std::string place = "/extensionsRequired/" + std::to_string(i);
-    // Moving what is no node is not rendered: never silently.
-    if (name == "KHR_animation_pointer" && document.options.frameTime)
-      document.report.warn(place,
-                           "extension " + quoted(name) + " is read but not rendered; the picture lacks its effect");
     if (isSupported(name)) continue;
     if (isIn(document.options.ignoredExtensions, name)) {
       document.report.warn(place, "extension " + quoted(name) + " is required but ignored, as --ignore-extension says");

@@ -128,7 +128,7 @@ constexpr Field kMeshopt[] = {index("buffer", "buffers", "write the index of the
                               whole("byteStride", 256, "write the size of one element"),
                               whole("count", kMostSize, "write the number of elements"),
                               word("mode", "ATTRIBUTES, TRIANGLES, INDICES", "write ATTRIBUTES, TRIANGLES or INDICES"),
-                              word("filter", "NONE, OCTAHEDRAL, QUATERNION, EXPONENTIAL")};
+                              word("filter", "NONE, OCTAHEDRAL, QUATERNION, EXPONENTIAL, COLOR")};
 constexpr Field kViewExtensions[] = {object("EXT_meshopt_compression", kMeshopt),
                                      object("KHR_meshopt_compression", kMeshopt)};
 constexpr Field kView[] = {index("buffer", "buffers", "write the index of a buffer", "-1"),
@@ -225,7 +225,10 @@ constexpr Field kSkin[] = {indices("joints", "nodes", "list the nodes that move 
 constexpr Field kAnimationSampler[] = {index("input", "accessors", "write the accessor of the key times", "-1"),
                                        index("output", "accessors", "write the accessor of the key values", "-1"),
                                        word("interpolation", "LINEAR, STEP, CUBICSPLINE")};
+constexpr Field kPointer[] = {text("pointer")};
+constexpr Field kTargetExtensions[] = {object("KHR_animation_pointer", kPointer)};
 constexpr Field kTarget[] = {{.name = "node", .kind = Kind::Index, .of = "nodes", .fallback = "-1"},
+                             object("extensions", kTargetExtensions),
                              word("path", "translation, rotation, scale, weights, pointer",
                                   "write translation, rotation, scale or weights", "\"\"")};
 constexpr Field kChannel[] = {index("sampler", "samplers of this animation", "write the index of a sampler", "-1"),

@@ -4,13 +4,14 @@
 
 #include "renderer/core/parallel.h"
 #include "renderer/scene/gltf/document/gltf_document.h"
+#include "renderer/scene/gltf/document/meshopt_vertices.h"
 
 namespace braid::gltf {
 
 namespace {
 
 enum class Mode : uint8_t { Attributes, Triangles, Indices };
-enum class Filter : uint8_t { None, Octahedral, Quaternion, Exponential };
+enum class Filter : uint8_t { None, Octahedral, Quaternion, Exponential, Colour };
 
 // What EXT_meshopt_compression says of a view.
 struct Packed {
@@ -36,6 +37,7 @@ Packed readPacked(const Value& json) {
           filter == "OCTAHEDRAL"    ? Filter::Octahedral
           : filter == "QUATERNION"  ? Filter::Quaternion
           : filter == "EXPONENTIAL" ? Filter::Exponential
+          : filter == "COLOR"       ? Filter::Colour
                                     : Filter::None};
 }
 
@@ -71,8 +73,8 @@ bool layoutValid(const Packed& view, uint64_t viewLength, Report& report, const 
         without);
     return false;
   }
-  // The codecs pack at best 64 to 1; more is a declared size that the data cannot hold.
-  if (view.count > viewLength / view.stride || view.count * view.stride > view.length * 256 + 4096) {
+  // The codecs pack at best 1024 to 1; more is a declared size that the data cannot hold.
+  if (view.count > viewLength / view.stride || view.count * view.stride > view.length * 1024 + 4096) {
     report.problem(place + "/count",
                    "is " + std::to_string(view.count) + ", more than the view can hold; compress the file again",
                    without);
@@ -83,9 +85,11 @@ bool layoutValid(const Packed& view, uint64_t viewLength, Report& report, const 
                    without);
     return false;
   }
-  const bool filterFits = view.filter == Filter::None ||
-                          (attributes && (view.filter != Filter::Octahedral || view.stride == 4 || view.stride == 8) &&
-                           (view.filter != Filter::Quaternion || view.stride == 8));
+  const bool filterFits =
+      view.filter == Filter::None ||
+      (attributes &&
+       ((view.filter != Filter::Octahedral && view.filter != Filter::Colour) || view.stride == 4 || view.stride == 8) &&
+       (view.filter != Filter::Quaternion || view.stride == 8));
   if (!filterFits)
     report.problem(place + "/filter", "does not fit mode and byteStride; compress the file again", without);
   return filterFits;
@@ -95,8 +99,11 @@ bool layoutValid(const Packed& view, uint64_t viewLength, Report& report, const 
 bool decodeMeshopt(const Packed& view, Bytes source, std::vector<uint8_t>& out) {
   switch (view.mode) {
     case Mode::Attributes:
-      if (meshopt_decodeVertexBuffer(out.data(), view.count, view.stride, source.data(), source.size()) != 0)
+      if (source[0] == kMeshoptVersion1) {
+        if (!decodeMeshoptVertices(source, view.count, view.stride, out.data())) return false;
+      } else if (meshopt_decodeVertexBuffer(out.data(), view.count, view.stride, source.data(), source.size()) != 0) {
         return false;
+      }
       break;
     case Mode::Triangles:
       return meshopt_decodeIndexBuffer(out.data(), view.count, view.stride, source.data(), source.size()) == 0;
@@ -114,6 +121,9 @@ bool decodeMeshopt(const Packed& view, Bytes source, std::vector<uint8_t>& out) 
       break;
     case Filter::Exponential:
       meshopt_decodeFilterExp(out.data(), view.count, view.stride);
+      break;
+    case Filter::Colour:
+      decodeMeshoptColours(out.data(), view.count, view.stride);
       break;
   }
   return true;
@@ -150,7 +160,7 @@ void resolveViews(Document& document) {
   }
   parallelFor(jobs.size(), [&](size_t i) {
     Job& job = jobs[i];
-    // Never allocated beyond the check above: at most 256 times the compressed bytes.
+    // Never allocated beyond the check above: at most 1024 times the compressed bytes.
     job.view->decoded.resize(job.packed.count * job.packed.stride);
     job.decoded = decodeMeshopt(job.packed, job.source, job.view->decoded);
   });
@@ -161,9 +171,7 @@ void resolveViews(Document& document) {
       continue;
     }
     job.view->decoded = {};
-    document.report.problem(job.place,
-                            "cannot be decompressed: the data is broken or of a newer codec version; compress the "
-                            "file again with version 0",
+    document.report.problem(job.place, "cannot be decompressed: the data is broken; compress the file again",
                             "what reads it is left out");
   }
 }

@@ -16,4 +16,16 @@ void parseNode(const nlohmann::json& json, tinygltf::Node& node) {
   tinygltf::ParseNode(&node, nullptr, json, false);
 }
 
+void parseMaterial(const nlohmann::json& json, tinygltf::Material& material) {
+  tinygltf::ParseMaterial(&material, nullptr, json, false);
+}
+
+void parseCamera(const nlohmann::json& json, tinygltf::Camera& camera) {
+  tinygltf::ParseCamera(&camera, nullptr, json, false);
+}
+
+void parseLight(const nlohmann::json& json, tinygltf::Light& light) {
+  tinygltf::ParseLight(&light, nullptr, json, false);
+}
+
 }  // namespace braid::gltf

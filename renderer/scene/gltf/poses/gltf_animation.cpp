@@ -2,6 +2,7 @@
 // Animation channels evaluated at one moment: STEP, LINEAR and CUBICSPLINE, clamped outside their keys.
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <unordered_map>
 
@@ -33,28 +34,34 @@ class Animator {
 
   void apply(const tinygltf::Animation& animation, const tinygltf::AnimationChannel& channel,
              const std::string& place) {
-    if (channel.sampler < 0) return;
-    const tinygltf::AnimationSampler& sampler = animation.samplers[static_cast<size_t>(channel.sampler)];
-    document_.useAccessor(sampler.input);
-    document_.useAccessor(sampler.output);
-    const size_t width = animatedWidth(document_, channel);
-    if (width == 0) return;
-    if (sampler.input < 0 || sampler.output < 0) return;
-    // Broken accessors have no values.
-    const std::vector<float>& times = floats(sampler.input);
-    const size_t perKey = (sampler.interpolation == "CUBICSPLINE" ? 3 : 1) * width;
-    if (times.empty() || floats(sampler.output).size() < times.size() * perKey || !isOrdered(place, times)) return;
+    const std::optional<std::vector<double>> value =
+        valueOf(animation, channel, animatedWidth(document_, channel), place);
+    if (!value) return;
     tinygltf::Node& node = document_.model.nodes[static_cast<size_t>(channel.target_node)];
     if (!node.matrix.empty() && channel.target_path != "weights") {
       document_.report.warn(place, "an animated node has a matrix; it stays at rest");
       return;
     }
-    const std::vector<double> value = evaluate(sampler, channel, findKeys(times, time_), width);
-    if (std::all_of(value.begin(), value.end(), [](double v) { return std::isfinite(v); })) {
-      assign(node, channel.target_path, value);
-    } else {
-      document_.report.warn(place, "an animation yields values that are not finite; its target stays at rest");
-    }
+    assign(node, channel.target_path, *value);
+  }
+
+  // None: the channel says nothing.
+  std::optional<std::vector<double>> valueOf(const tinygltf::Animation& animation,
+                                             const tinygltf::AnimationChannel& channel, size_t width,
+                                             const std::string& place) {
+    if (channel.sampler < 0) return {};
+    const tinygltf::AnimationSampler& sampler = animation.samplers[static_cast<size_t>(channel.sampler)];
+    document_.useAccessor(sampler.input);
+    document_.useAccessor(sampler.output);
+    if (width == 0 || sampler.input < 0 || sampler.output < 0) return {};
+    // Broken accessors have no values.
+    const std::vector<float>& times = floats(sampler.input);
+    const size_t perKey = (sampler.interpolation == "CUBICSPLINE" ? 3 : 1) * width;
+    if (times.empty() || floats(sampler.output).size() < times.size() * perKey || !isOrdered(place, times)) return {};
+    std::vector<double> value = evaluate(sampler, channel, findKeys(times, time_), width);
+    if (std::all_of(value.begin(), value.end(), [](double v) { return std::isfinite(v); })) return value;
+    document_.report.warn(place, "an animation yields values that are not finite; its target stays at rest");
+    return {};
   }
 
  private:
@@ -144,10 +151,16 @@ void animate(Document& document, int clip, float time) {
   const tinygltf::Animation& animation = document.model.animations[static_cast<size_t>(clip)];
   for (size_t c = 0; c < animation.channels.size(); ++c) {
     const std::string place = "/animations/" + std::to_string(clip) + "/channels/" + std::to_string(c);
-    if (animation.channels[c].target_path == "pointer")
-      document.report.warn(place, "animations of other properties (KHR_animation_pointer) are ignored");
     animator.apply(animation, animation.channels[c], place);
   }
+}
+
+std::optional<std::vector<double>> animatedValue(Document& document, const AnimatedProperty& property, float time) {
+  const tinygltf::Animation& animation = document.model.animations[static_cast<size_t>(property.clip)];
+  const std::string place =
+      "/animations/" + std::to_string(property.clip) + "/channels/" + std::to_string(property.channel);
+  return Animator(document, time)
+      .valueOf(animation, animation.channels[static_cast<size_t>(property.channel)], property.width, place);
 }
 
 double clipSeconds(const Document& document, const tinygltf::Animation& animation) {

@@ -2,6 +2,7 @@
 // Where every node stands at one moment of the animation.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "renderer/scene/data/gltf.h"
@@ -31,6 +32,16 @@ glm::dquat quaternion(const double* xyzw);
 
 // gltf_animation.cpp: applies all channels of a clip at `time`.
 void animate(Document& document, int clip, float time);
+
+// gltf_animation.cpp: the value of a property at `time`; none: its channel says nothing.
+std::optional<std::vector<double>> animatedValue(Document& document, const AnimatedProperty& property, float time);
+
+// gltf_pointers.cpp, KHR_animation_pointer. Finds what the pointers of a file lead to: places of nodes become ordinary
+// channels, the rest properties of the document.
+void resolvePointers(Document& document);
+// Gives them their values at the time of the frame; while a shutter is open, at its middle. Materials, cameras and
+// lights that change are read again.
+void animateProperties(Document& document);
 
 // The last key time of a clip.
 double clipSeconds(const Document& document, const tinygltf::Animation& animation);
