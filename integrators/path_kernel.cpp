@@ -239,6 +239,7 @@ void PathKernel::shadeActive() {
     const int p = active_[static_cast<size_t>(a)];
     const auto i = static_cast<size_t>(p), ray = static_cast<size_t>(a);
     if (!(query_[ray].t < kInfinity)) {
+      ++missCount;
       if (observer_) observer_->onMiss();
       addEnvironment(path_[i], sample_[i]);
       continue;

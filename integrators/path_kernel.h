@@ -61,7 +61,7 @@ class PathKernel {
   void clear() { count_ = 0; }
   void observe(PathObserver* observer) { observer_ = observer; }
 
-  uint64_t rayCount = 0, shadowRayCount = 0;
+  uint64_t rayCount = 0, shadowRayCount = 0, missCount = 0;
 
  protected:
   float timeOf(int x, int y, uint64_t key) const;

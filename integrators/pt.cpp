@@ -24,6 +24,7 @@ class PathTracer final : public Integrator {
   double misses(const LightReach& reach) const override { return reach.beyondCameraPaths; }
 
   bool separatesDirectLight() const override { return true; }
+  bool placesSamples() const override { return true; }
 
   std::unique_ptr<PassSampler> pixelSampler(const Plan& plan, uint64_t pass) const override {
     return std::make_unique<PassSampler>(plan.settings.sampler, plan.settings.seed, kStream, pass);

@@ -45,6 +45,9 @@ nlohmann::json resultRecord(const FinishedRender& render, const RenderOptions& o
   return {{"status", r.reason == StopReason::Cancelled ? "interrupted" : "done"},
           {"reason", toString(r.reason)},
           {"spp", r.spp},
+          {"fewestSamples", r.mostSamples > 0 ? r.fewestSamples : r.spp},
+          {"mostSamples", r.mostSamples > 0 ? r.mostSamples : r.spp},
+          {"placementGain", r.placementGain > 0 ? nlohmann::json(r.placementGain) : nullptr},
           {"estimatedError", errorOrNull(render.written.error)},
           {"exposure", render.written.tone ? nlohmann::json(render.written.tone->exposureStops) : nullptr},
           {"seconds",
@@ -68,6 +71,9 @@ void sayResult(const FinishedRender& render, const RenderOptions& o) {
   for (const std::string& text : written.warnings) fmt::print(stderr, "warning: {}\n", text);
   if (r.rejected > 0) fmt::print(stderr, "warning: {} non-finite or negative samples counted as 0\n", r.rejected);
   if (r.firstRejected) fmt::print(stderr, "one of them: {}\n", describe(*r.firstRejected, o));
+  if (r.placementGain > 0)
+    fmt::print(stderr, "{} to {} samples a pixel, by which {:.2f} times less error is expected\n", r.fewestSamples,
+               r.mostSamples, r.placementGain);
   for (const std::string& text : written.timings) fmt::print(stderr, "{}\n", text);
   if (written.tone) fmt::print(stderr, "{}\n", describe(*written.tone));
   std::string outputs;
