@@ -252,6 +252,7 @@ void PathKernel::shadeActive() {
     const auto i = static_cast<size_t>(p), ray = static_cast<size_t>(a);
     if (recorder_) recorder_->arrive(p, sample_[i].radiance);
     if (!(query_[ray].t < kInfinity)) {
+      ++missCount;
       if (observer_) observer_->onMiss();
       addEnvironment(path_[i], sample_[i]);
       continue;

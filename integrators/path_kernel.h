@@ -66,7 +66,8 @@ class PathKernel {
   // Every vertex is told to the recorder.
   void teach(PathRecorder* recorder) { recorder_ = recorder; }
 
-  uint64_t rayCount = 0, shadowRayCount = 0, guidedCount = 0;  // guidedCount: vertices with a guide
+  uint64_t rayCount = 0, shadowRayCount = 0, missCount = 0;
+  uint64_t guidedCount = 0;  // vertices with a guide
 
  protected:
   float timeOf(int x, int y, uint64_t key) const;

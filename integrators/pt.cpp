@@ -25,6 +25,7 @@ class PathTracer final : public Integrator {
   double misses(const LightReach& reach) const override { return reach.beyondCameraPaths; }
 
   bool separatesDirectLight() const override { return true; }
+  bool placesSamples() const override { return true; }
 
   std::shared_ptr<const Preparation> prepare(const TransportContext& context, const Plan& plan) const override {
     return guidingApplies(plan).yes ? std::make_shared<GuidePreparation>(context, plan) : nullptr;

@@ -83,22 +83,33 @@ inline void storeSample(const PassRequest& request, int x, int y, const PathSamp
   if (target.wantsCoverage()) target.coverage(px, py, catches ? shadowOf(request, sample) : sample.coverage);
 }
 
+// What is found by a camera path through every pixel of a tile goes to the film.
+inline void renderTile(const Integrator& integrator, const PassRequest& request, const PassSampler& sampler,
+                       const PixelWindow& tile, PathKernel& kernel, PassTarget& target) {
+  forEachBatch(
+      tile,
+      [&](int i, int x, int y) {
+        if (i == 0) kernel.clear();
+        kernel.start(x, y, integrator.pixelKey(sampler, request.plan, x, y));
+      },
+      [&] { kernel.run(); }, [&](int i, int x, int y) { storeSample(request, x, y, kernel.sample(i), target); });
+}
+
+// The same of the tiles that request.tiles names.
+bool renderPlacedTiles(const Integrator& integrator, const PassRequest& request, PassTarget& target,
+                       const Guide* guide);
+
 // A pass of one camera path for every pixel, followed by the path kernel with the integrator's random numbers and
 // roulette, and with the guide if there is one. Returns false when cancelled.
 inline bool renderCameraPaths(const Integrator& integrator, const PassRequest& request, PassTarget& target,
                               const Guide* guide = nullptr) {
+  if (request.tiles) return renderPlacedTiles(integrator, request, target, guide);
   const Plan& plan = request.plan;
   const std::unique_ptr<PassSampler> sampler = integrator.pixelSampler(plan, request.pass);
   return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>* record) {
     PathKernel kernel(request.context, plan, *sampler, record, integrator.roulette());
     kernel.guideBy(guide);
-    forEachBatch(
-        tile,
-        [&](int i, int x, int y) {
-          if (i == 0) kernel.clear();
-          kernel.start(x, y, integrator.pixelKey(*sampler, plan, x, y));
-        },
-        [&] { kernel.run(); }, [&](int i, int x, int y) { storeSample(request, x, y, kernel.sample(i), target); });
+    renderTile(integrator, request, *sampler, tile, kernel, target);
     return TileCounts{pixelCount(tile), kernel.rayCount, kernel.shadowRayCount};
   });
 }

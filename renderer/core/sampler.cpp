@@ -20,27 +20,41 @@ constexpr uint32_t reverseBits(uint32_t x) {
 
 float toUnit(uint32_t x) { return static_cast<float>(x >> 8) * 0x1p-24f; }
 
-// One Sobol' coordinate: dimension d, point i. The initial numbers m are extended by the recurrence of the dimension's
-// primitive polynomial (Joe and Kuo 2008, Eq. 2).
-uint32_t sobolCoordinate(unsigned d, uint32_t i) {
+using Directions = std::array<uint32_t, 32>;
+
+// The direction numbers of one Sobol' coordinate. The initial numbers m are extended by the recurrence of the
+// dimension's primitive polynomial (Joe and Kuo 2008, Eq. 2).
+Directions directionsOf(unsigned d) {
   using Table = boost::random::default_sobol_table;
-  std::array<uint32_t, 32> v{};
+  Directions v{};
   if (d == 0) {
     for (unsigned k = 0; k < 32; ++k) v[k] = 1u << (31 - k);
-  } else {
-    const auto polynomial = static_cast<uint32_t>(Table::polynomial(d - 1));
-    unsigned degree = 31;
-    while (!(polynomial >> degree)) --degree;
-    for (unsigned k = 0; k < degree; ++k) v[k] = static_cast<uint32_t>(Table::minit(d - 1, k)) << (31 - k);
-    for (unsigned k = degree; k < 32; ++k) {
-      v[k] = v[k - degree] ^ (v[k - degree] >> degree);
-      for (unsigned j = 1; j < degree; ++j)
-        if ((polynomial >> (degree - j)) & 1u) v[k] ^= v[k - j];
-    }
+    return v;
   }
+  const auto polynomial = static_cast<uint32_t>(Table::polynomial(d - 1));
+  unsigned degree = 31;
+  while (!(polynomial >> degree)) --degree;
+  for (unsigned k = 0; k < degree; ++k) v[k] = static_cast<uint32_t>(Table::minit(d - 1, k)) << (31 - k);
+  for (unsigned k = degree; k < 32; ++k) {
+    v[k] = v[k - degree] ^ (v[k - degree] >> degree);
+    for (unsigned j = 1; j < degree; ++j)
+      if ((polynomial >> (degree - j)) & 1u) v[k] ^= v[k - j];
+  }
+  return v;
+}
+
+// One Sobol' coordinate: dimension d, point i. The first dimensions' numbers are kept: passes that render some tiles
+// only make a table for few pixels.
+uint32_t sobolCoordinate(unsigned d, uint32_t i) {
+  static const std::vector<Directions> kept = [] {
+    std::vector<Directions> list;
+    for (unsigned k = 0; k < 24 * kBlockSize; ++k) list.push_back(directionsOf(k));
+    return list;
+  }();
+  const Directions v = d < kept.size() ? kept[d] : directionsOf(d);
   uint32_t x = 0;
-  for (unsigned k = 0; k < 32; ++k)
-    if ((i >> k) & 1u) x ^= v[k];
+  for (unsigned k = 0; i != 0; ++k, i >>= 1)
+    if (i & 1u) x ^= v[k];
   return x;
 }
 

@@ -9,6 +9,17 @@
 
 namespace braid {
 
+namespace {
+
+// One image by its name, those of halves with their letter.
+void listSquares(const std::string& name, std::vector<Rgb<double>>& squares, RawSums& list) {
+  if (squares.size() == 1) return listColour(name, squares[0], list);
+  listColour(name + "A", squares[0], list);
+  listColour(name + "B", squares[1], list);
+}
+
+}  // namespace
+
 void addSums(const RawSums& to, const RawSums& from) {
   BRAID_ASSERT(to.size() == from.size());
   for (size_t p = 0; p < to.size(); ++p) {
@@ -23,7 +34,7 @@ void addSums(const RawSums& to, const RawSums& from) {
 
 void Accumulator::listSums(const std::string& sum, const std::string& squares, RawSums& list) {
   for (size_t k = 0; k < sum_.size(); ++k) listColour(sum + std::to_string(k), sum_[k], list);
-  listColour(squares, sumsq_, list);
+  listSquares(squares, squares_, list);
 }
 
 void Accumulator::listBias(const std::string& bias, RawSums& list) {
@@ -49,7 +60,7 @@ void Accumulator::addCounts(const Accumulator& other) {
 
 void DirectLightAccumulator::listSums(const std::string& name, RawSums& list) {
   direct_.listSums(name + "direct", name + "directSquares", list);
-  listColour(name + "indirectSquares", indirectSumsq_, list);
+  listSquares(name + "indirectSquares", indirectSquares_, list);
 }
 
 void FeatureAccumulator::listSums(const std::string& name, RawSums& list) {

@@ -8,19 +8,22 @@
 
 namespace braid {
 
-DirectLightAccumulator::DirectLightAccumulator(int width, int height, int buckets)
-    : direct_(width, height, buckets), indirectSumsq_(width, height) {}
+DirectLightAccumulator::DirectLightAccumulator(int width, int height, int buckets, KeptSquares squares)
+    : direct_(width, height, buckets, false, squares), indirectSquares_(direct_.squares()) {}
 
-void DirectLightAccumulator::commit(uint64_t pass, const PassTarget& target) {
+void DirectLightAccumulator::commit(uint64_t pass, const PassTarget& target, bool counts) {
   BRAID_ASSERT(target.wantsDirect());  // its splats, if any, are those of other integrators
-  direct_.commit(pass, target.direct_);
-  for (size_t c = 0; c < 3; ++c)
-    parallelChunks(indirectSumsq_.size(), kPixelChunk, [&](size_t begin, size_t end) {
+  Rgb<double>& squares = indirectSquares_[pass % indirectSquares_.size()];
+  target.forEachRun([&](size_t begin, size_t count) {
+    direct_.commitRun(pass, target.direct_, begin, count);
+    for (size_t c = 0; c < 3; ++c) {
       const float *own = target.own_[c].data.data(), *direct = target.direct_[c].data.data();
-      double* sumsq = indirectSumsq_[c].data.data();
-      for (size_t i = begin; i < end; ++i)
+      double* sumsq = squares[c].data.data();
+      for (size_t i = begin; i < begin + count; ++i)
         sumsq[i] += sqr(static_cast<double>(own[i]) - static_cast<double>(direct[i]));
-    });
+    }
+  });
+  if (counts) direct_.countPass(pass);
 }
 
 DirectLight DirectLightAccumulator::directPart(bool lowDiscrepancy) const {
@@ -28,6 +31,10 @@ DirectLight DirectLightAccumulator::directPart(bool lowDiscrepancy) const {
 }
 
 Rgb<float> DirectLightAccumulator::indirectVariance(const Accumulator& whole, bool lowDiscrepancy) const {
+  return indirect(whole).variance(lowDiscrepancy);
+}
+
+Accumulator DirectLightAccumulator::indirect(const Accumulator& whole) const {
   std::vector<Rgb<double>> sums = whole.sums();
   std::vector<uint64_t> counts;
   for (size_t k = 0; k < sums.size(); ++k) {
@@ -37,7 +44,7 @@ Rgb<float> DirectLightAccumulator::indirectVariance(const Accumulator& whole, bo
         for (size_t i = begin; i < end; ++i) sums[k][c][i] -= direct_.sums()[k][c][i];
       });
   }
-  return Accumulator::fromSums(std::move(sums), indirectSumsq_, std::move(counts), 0, 0).variance(lowDiscrepancy);
+  return Accumulator::fromSums(std::move(sums), indirectSquares_, std::move(counts));
 }
 
 }  // namespace braid

@@ -38,6 +38,9 @@ struct Estimate : EstimateHead {
   Rgb<float> half[2];               // A, B
   std::vector<Rgb<float>> quarter;  // four, or none
   Rgb<float> variance;              // of the mean; empty when not known
+  // Of the pixels, where they differ in their numbers (SamplePlacement): `passes` on average; else empty. The mean is
+  // that of the two halves then, whatever their numbers.
+  Plane<float> samples;
   // Of integrators that estimate their bias: the mean estimate, those of the halves, and the variance of the mean; else
   // empty.
   Rgb<float> bias, biasHalf[2], biasVariance;

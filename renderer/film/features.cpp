@@ -29,12 +29,10 @@ FeatureAccumulator::FeatureAccumulator(int width, int height)
            Planes(kFeatureComponents, Plane<double>(width, height))},
       sumsq_(kFeatureComponents, Plane<double>(width, height)) {}
 
-void FeatureAccumulator::commit(uint64_t pass, const PassTarget& target) {
+void FeatureAccumulator::commit(uint64_t pass, const PassTarget& target, bool counts) {
   BRAID_ASSERT(target.wantsFeatures() && target.width_ == sumsq_[0].width && target.height_ == sumsq_[0].height);
   const size_t half = pass % 2;
-  const auto width = static_cast<size_t>(target.width_);
-  parallelRows(target.height_, [&](int y) {
-    const size_t begin = static_cast<size_t>(y) * width;
+  target.forEachRun([&](size_t begin, size_t width) {
     for (size_t c = 0; c < kFeatureComponents; ++c) {
       const float* __restrict in = target.features_[c].data.data() + begin;
       double* __restrict sum = sum_[half][c].data.data() + begin;
@@ -46,7 +44,7 @@ void FeatureAccumulator::commit(uint64_t pass, const PassTarget& target) {
       }
     }
   });
-  ++count_[half];
+  if (counts) ++count_[half];
 }
 
 Plane<float> FeatureAccumulator::mean(int component) const {

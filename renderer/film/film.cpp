@@ -14,11 +14,6 @@ namespace braid {
 
 namespace {
 
-// Radius of the box that compares the two variance estimates, in pixels: 9 x 9. In a larger one the noisiest pixels
-// decide for more of their neighbours, while the image's sum is right with either (combiners/EXPERIMENTS.md, Box of the
-// variance ratio).
-constexpr int kVarianceBoxRadius = 4;
-
 void commitRow(const float* __restrict own, double* __restrict sum, double* __restrict sumsq, size_t width) {
   for (size_t x = 0; x < width; ++x) {
     const double v = static_cast<double>(own[x]);
@@ -43,39 +38,46 @@ void commitRow(const float* __restrict own, const int64_t* __restrict splats, do
 
 }  // namespace
 
-Accumulator::Accumulator(int width, int height, int buckets, bool bias)
+Accumulator::Accumulator(int width, int height, int buckets, bool bias, KeptSquares squares)
     : sum_(static_cast<size_t>(buckets), Rgb<double>(width, height)),
-      sumsq_(width, height),
+      squares_(squares == KeptSquares::Halves ? 2 : 1, Rgb<double>(width, height)),
       keepsBias_(bias),
       count_(static_cast<size_t>(buckets), 0) {
   BRAID_ASSERT(buckets >= 2 && buckets % 2 == 0);
   if (bias) biasSum_[0] = biasSum_[1] = biasSumsq_ = Rgb<double>(width, height);
 }
 
-Accumulator Accumulator::fromSums(std::vector<Rgb<double>> sums, Rgb<double> sumOfSquares, std::vector<uint64_t> counts,
-                                  uint64_t rejected, uint64_t clampedSplats) {
+Accumulator Accumulator::fromSums(std::vector<Rgb<double>> sums, std::vector<Rgb<double>> squares,
+                                  std::vector<uint64_t> counts) {
   Accumulator a(0, 0, static_cast<int>(sums.size()));
   BRAID_ASSERT(counts.size() == sums.size());
-  for (const Rgb<double>& s : sums)
-    BRAID_ASSERT(s.width() == sumOfSquares.width() && s.height() == sumOfSquares.height());
+  for (const Rgb<double>& s : sums) BRAID_ASSERT(s.width() == squares[0].width() && s.height() == squares[0].height());
   a.sum_ = std::move(sums);
-  a.sumsq_ = std::move(sumOfSquares);
-  a.setCounts(std::move(counts), rejected, clampedSplats);
+  a.squares_ = std::move(squares);
+  a.setCounts(std::move(counts), 0, 0);
   return a;
 }
 
-void Accumulator::commit(uint64_t pass, const PassTarget& target) {
+Accumulator Accumulator::fromSums(std::vector<Rgb<double>> sums, Rgb<double> sumOfSquares, std::vector<uint64_t> counts,
+                                  uint64_t rejected, uint64_t clampedSplats) {
+  std::vector<Rgb<double>> squares;
+  squares.push_back(std::move(sumOfSquares));
+  Accumulator a = fromSums(std::move(sums), std::move(squares), std::move(counts));
+  a.rejected_ = rejected;
+  a.clampedSplats_ = clampedSplats;
+  return a;
+}
+
+void Accumulator::commit(uint64_t pass, const PassTarget& target, bool counts) {
   BRAID_ASSERT(target.width_ == width() && target.height_ == height());
   const size_t bucket = pass % count_.size();
-  Rgb<double>& sum = sum_[bucket];
-  const auto width = static_cast<size_t>(sumsq_.width());
+  Rgb<double>&sum = sum_[bucket], &squares = squaresOf(pass);
   const double unit = 1 / target.splatScale_;
-  parallelRows(height(), [&](int y) {
-    const size_t begin = static_cast<size_t>(y) * width;
+  target.forEachRun([&](size_t begin, size_t width) {
     for (size_t c = 0; c < 3; ++c) {
       const float* own = target.own_[c].data.data() + begin;
       double* s = sum[c].data.data() + begin;
-      double* q = sumsq_[c].data.data() + begin;
+      double* q = squares[c].data.data() + begin;
       if (target.splats_.empty())
         commitRow(own, s, q, width);
       else
@@ -83,27 +85,26 @@ void Accumulator::commit(uint64_t pass, const PassTarget& target) {
     }
   });
   if (keepsBias()) commitBias(static_cast<int>(pass % 2), target);
-  ++count_[bucket];
+  if (counts) ++count_[bucket];
   rejected_ += target.rejected();
   clampedSplats_ += target.clampedSplats();
 }
 
 void Accumulator::commit(uint64_t pass, const Rgb<float>& values) {
   BRAID_ASSERT(values.width() == width() && values.height() == height());
-  const size_t bucket = pass % count_.size();
-  const auto width = static_cast<size_t>(sumsq_.width());
-  parallelRows(height(), [&](int y) {
-    const size_t begin = static_cast<size_t>(y) * width;
-    for (size_t c = 0; c < 3; ++c)
-      commitRow(values[c].data.data() + begin, sum_[bucket][c].data.data() + begin, sumsq_[c].data.data() + begin,
-                width);
-  });
-  ++count_[bucket];
+  parallelRows(height(), [&](int y) { commitRun(pass, values, values[0].index(0, y), static_cast<size_t>(width())); });
+  ++count_[pass % count_.size()];
+}
+
+void Accumulator::commitRun(uint64_t pass, const Rgb<float>& values, size_t begin, size_t count) {
+  Rgb<double>&sum = sum_[pass % count_.size()], &squares = squaresOf(pass);
+  for (size_t c = 0; c < 3; ++c)
+    commitRow(values[c].data.data() + begin, sum[c].data.data() + begin, squares[c].data.data() + begin, count);
 }
 
 void Accumulator::commitBias(int half, const PassTarget& target) {
   BRAID_ASSERT(target.wantsBias());
-  const auto width = static_cast<size_t>(sumsq_.width());
+  const auto width = static_cast<size_t>(squares_[0].width());
   parallelRows(height(), [&](int y) {
     const size_t begin = static_cast<size_t>(y) * width;
     for (size_t c = 0; c < 3; ++c)
@@ -160,7 +161,7 @@ Rgb<float> Accumulator::meanOfBuckets(int first, int step) const {
   }
   Rgb<float> out(width(), height());
   if (n == 0) return out;
-  const auto width = static_cast<size_t>(sumsq_.width());
+  const auto width = static_cast<size_t>(squares_[0].width());
   parallelRows(height(), [&](int y) {
     const size_t begin = static_cast<size_t>(y) * width;
     for (size_t c = 0; c < 3; ++c)
@@ -180,14 +181,16 @@ Rgb<float> Accumulator::halfMean(int half) const { return meanOfBuckets(half, 2)
 Rgb<float> Accumulator::passVariance() const {
   Rgb<float> out(width(), height());
   const uint64_t n = passes();
-  const auto width = static_cast<size_t>(sumsq_.width());
+  const auto width = static_cast<size_t>(squares_[0].width());
   parallelRows(height(), [&](int y) {
     const size_t begin = static_cast<size_t>(y) * width;
     for (size_t c = 0; c < 3; ++c)
       for (size_t i = begin; i < begin + width; ++i) {
         double total = 0;
         for (const Rgb<double>& s : sum_) total += s[c][i];
-        out[c][i] = floatVarianceOfMean(total, sumsq_[c][i], n);
+        double squares = 0;
+        for (const Rgb<double>& s : squares_) squares += s[c][i];
+        out[c][i] = floatVarianceOfMean(total, squares, n);
       }
   });
   return out;
@@ -204,7 +207,7 @@ Plane<double> Accumulator::bucketVariance(size_t channel) const {
       n += static_cast<double>(count_[k]);
     }
   Plane<double> out(width(), height());
-  const auto width = static_cast<size_t>(sumsq_.width());
+  const auto width = static_cast<size_t>(squares_[0].width());
   parallelRows(height(), [&](int y) {
     const size_t begin = static_cast<size_t>(y) * width;
     for (size_t i = begin; i < begin + width; ++i) {

@@ -9,9 +9,11 @@
 #include <cstdint>
 #include <vector>
 
+#include "renderer/core/parallel.h"
 #include "renderer/core/plane.h"
 #include "renderer/film/features.h"
 #include "renderer/film/raw_sums.h"
+#include "renderer/film/sample_placement.h"
 
 namespace braid {
 
@@ -70,6 +72,12 @@ class PassTarget {
 
   // Zeroes everything, for the next pass; keeps the allocation.
   void clear();
+  // The same for a pass of these tiles of SamplePlacement alone, by whose pixels, all written, it is committed; not
+  // with splats.
+  void clearFor(const std::vector<bool>& tiles);
+  // Calls body(first pixel, count) for runs of pixels of one row that are committed, parallel over rows.
+  template <class Body>
+  void forEachRun(const Body& body) const;
   uint64_t rejected() const { return rejected_.load(); }
   uint64_t clampedSplats() const { return clampedSplats_.load(); }
 
@@ -80,6 +88,7 @@ class PassTarget {
   friend class DirectLightAccumulator;
 
   int width_, height_;
+  std::vector<std::vector<std::pair<int, int>>> runs_;  // of the rows of each row of tiles; none: whole rows
   Rgb<float> own_;
   std::vector<int64_t> splats_;         // 3 per pixel, interleaved; empty when the integrator does not splat
   std::vector<Plane<float>> features_;  // kFeatureComponents planes, or empty
@@ -91,19 +100,37 @@ class PassTarget {
   std::atomic<uint64_t> rejected_{0}, clampedSplats_{0};
 };
 
+template <class Body>
+void PassTarget::forEachRun(const Body& body) const {
+  parallelRows(height_, [&](int y) {
+    const size_t row = own_[0].index(0, y);
+    if (runs_.empty()) return body(row, static_cast<size_t>(width_));
+    for (const auto& [begin, end] : runs_[static_cast<size_t>(y / SamplePlacement::kTile)])
+      body(row + static_cast<size_t>(begin), static_cast<size_t>(end - begin));
+  });
+}
+
+// Which squares of values an accumulator keeps: of all passes, or of the halves apart, as SamplePlacement needs them.
+enum class KeptSquares { Together, Halves };
+
 // Sums of one integrator's passes. Bucket of a pass = pass % bucketCount(); half A = even buckets, B = odd ones. All
-// pixels have the same count. 120 bytes a pixel with four buckets, 72 with two; 72 more with estimates of the bias.
+// pixels have the same count, but for PlacedSums. 120 bytes a pixel with four buckets, 72 with two; 72 more with
+// estimates of the bias, 24 with the squares of halves.
 class Accumulator {
  public:
-  Accumulator(int width, int height, int buckets, bool bias = false);
+  Accumulator(int width, int height, int buckets, bool bias = false, KeptSquares squares = KeptSquares::Together);
 
-  // Adds the pass: v = own + splats, sum[pass % K] += v, sumsq += v²; likewise the bias. Parallel over rows.
-  void commit(uint64_t pass, const PassTarget& target);
+  // Adds the pass: v = own + splats, sum[pass % K] += v, sumsq += v²; likewise the bias. Parallel over rows. `counts`:
+  // false for more samples of a pass that has been added already.
+  void commit(uint64_t pass, const PassTarget& target, bool counts = true);
   // The same of one plane of values a pass.
   void commit(uint64_t pass, const Rgb<float>& values);
+  // Part of that, without counting: so many pixels from one on.
+  void commitRun(uint64_t pass, const Rgb<float>& values, size_t begin, size_t count);
+  void countPass(uint64_t pass) { ++count_[pass % count_.size()]; }
 
-  int width() const { return sumsq_.width(); }
-  int height() const { return sumsq_.height(); }
+  int width() const { return squares_[0].width(); }
+  int height() const { return squares_[0].height(); }
   int bucketCount() const { return static_cast<int>(count_.size()); }
   uint64_t passes() const;
   uint64_t passesInBucket(int k) const { return count_[static_cast<size_t>(k)]; }
@@ -133,7 +160,11 @@ class Accumulator {
   const Rgb<double>& biasSum(int half) const { return biasSum_[half]; }
   const Rgb<double>& biasSumOfSquares() const { return biasSumsq_; }
   const std::vector<Rgb<double>>& sums() const { return sum_; }
-  const Rgb<double>& sumOfSquares() const { return sumsq_; }
+  const Rgb<double>& sumOfSquares() const { return squares_[0]; }
+  // One image, or those of the halves.
+  const std::vector<Rgb<double>>& squares() const { return squares_; }
+  static Accumulator fromSums(std::vector<Rgb<double>> sums, std::vector<Rgb<double>> squares,
+                              std::vector<uint64_t> counts);
   static Accumulator fromSums(std::vector<Rgb<double>> sums, Rgb<double> sumOfSquares, std::vector<uint64_t> counts,
                               uint64_t rejected, uint64_t clampedSplats);
   // Of other passes, whose sums are added by addSums().
@@ -144,8 +175,9 @@ class Accumulator {
   void commitBias(int half, const PassTarget& target);
   // Variance of the mean from the spread of the bucket means (independent scrambles).
   Plane<double> bucketVariance(size_t channel) const;
-  std::vector<Rgb<double>> sum_;
-  Rgb<double> sumsq_;
+  // Where the squares of a pass go.
+  Rgb<double>& squaresOf(uint64_t pass) { return squares_[pass % squares_.size()]; }
+  std::vector<Rgb<double>> sum_, squares_;
   bool keepsBias_;
   Rgb<double> biasSum_[2], biasSumsq_;  // of the halves, and of all passes; or empty
   std::vector<uint64_t> count_;
@@ -156,7 +188,7 @@ class Accumulator {
 class FeatureAccumulator {
  public:
   FeatureAccumulator(int width, int height);
-  void commit(uint64_t pass, const PassTarget& target);
+  void commit(uint64_t pass, const PassTarget& target, bool counts = true);
   uint64_t passes() const { return count_[0] + count_[1]; }
   Plane<float> mean(int component) const;
   Plane<float> halfMean(int component, int half) const;

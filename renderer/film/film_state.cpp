@@ -9,13 +9,16 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
+#include "renderer/film/placed_sums.h"
 #include "renderer/film/planes.h"
 
 namespace braid {
 
 namespace {
 
-Features collectFeatures(const FeatureAccumulator& a) {
+// `A`: a FeatureAccumulator or PlacedFeatures.
+template <class A>
+Features collectFeatures(const A& a) {
   Features features;
   int component = 0;
   for (size_t f = 0; f < kFeaturePlanes.size(); ++f)
@@ -27,15 +30,33 @@ Features collectFeatures(const FeatureAccumulator& a) {
   return features;
 }
 
+EstimateHead headOf(const EstimateState& state) {
+  return {state.name, state.unbiased, state.correlation, state.sums.passes(), state.seconds, state.sums.rejected()};
+}
+
+// Of a film whose tiles have different numbers of samples.
+Estimate placedEstimateOf(const EstimateState& state, const SamplePlacement& placement, bool quarters) {
+  const PlacedSums sums(state.sums, placement);
+  Estimate estimate;
+  static_cast<EstimateHead&>(estimate) = headOf(state);
+  estimate.mean = sums.mean();
+  for (int h = 0; h < 2; ++h) estimate.half[h] = sums.halfMean(h);
+  for (int k = 0; quarters && k < 4; ++k) estimate.quarter.push_back(sums.bucketMean(k));
+  estimate.variance = sums.variance(state.lowDiscrepancy);
+  estimate.samples = placement.samples();
+  if (state.parts) {
+    const PlacedSums direct(state.parts->direct(), placement);
+    estimate.direct = {direct.mean(), {direct.halfMean(0), direct.halfMean(1)}, direct.variance(state.lowDiscrepancy)};
+    const Accumulator indirect = state.parts->indirect(state.sums);
+    estimate.indirectVariance = PlacedSums(indirect, placement).variance(state.lowDiscrepancy);
+  }
+  return estimate;
+}
+
 Estimate estimateOf(const EstimateState& state, bool quarters) {
   const Accumulator& a = state.sums;
   Estimate estimate;
-  estimate.name = state.name;
-  estimate.correlation = state.correlation;
-  estimate.unbiased = state.unbiased;
-  estimate.passes = a.passes();
-  estimate.seconds = state.seconds;
-  estimate.rejected = a.rejected();
+  static_cast<EstimateHead&>(estimate) = headOf(state);
   estimate.mean = a.mean();
   for (int h = 0; h < 2; ++h) estimate.half[h] = a.halfMean(h);
   if (quarters && a.bucketCount() == 4)
@@ -104,6 +125,7 @@ RawSums FilmState::sharedSums() {
   RawSums list;
   if (features) features->listSums("features.", list);
   if (coverage) coverage->listSums("coverage", list);
+  if (placement) placement->listSums(list);
   return list;
 }
 
@@ -115,13 +137,15 @@ void EstimateState::addPass(uint64_t pass) {
     passes.push_back({pass, pass + 1});
 }
 
-void EstimateState::keepCheckpoint(const std::vector<uint64_t>& stops) {
+void EstimateState::keepCheckpoint(const std::vector<uint64_t>& stops, const SamplePlacement* placement) {
   const uint64_t before = history.empty() ? 0 : history.back().passes;
-  Checkpoint c{sums.passes(), seconds, sums.variance(lowDiscrepancy)};
+  std::optional<PlacedSums> placed;
+  if (placement && !placement->even()) placed.emplace(sums, *placement);
+  Checkpoint c{sums.passes(), seconds, placed ? placed->variance(lowDiscrepancy) : sums.variance(lowDiscrepancy)};
   const bool image = std::any_of(stops.begin(), stops.end(), [&](uint64_t n) { return n > before && n <= c.passes; });
   if (image && unbiased && correlation == Correlation::Independent) {
-    c.mean = sums.mean();
-    for (int h = 0; h < 2; ++h) c.half[h] = sums.halfMean(h);
+    c.mean = placed ? placed->mean() : sums.mean();
+    for (int h = 0; h < 2; ++h) c.half[h] = placed ? placed->halfMean(h) : sums.halfMean(h);
   }
   history.push_back(std::move(c));
 }
@@ -158,19 +182,49 @@ uint64_t FilmState::rejected() const {
   return count;
 }
 
-Estimates estimatesOf(const FilmState& state, bool quarters) {
+namespace {
+
+Estimates estimatesHead(const FilmState& state) {
   Estimates e;
-  e.width = state.window.width();
-  e.height = state.window.height();
-  e.window = state.window;
-  e.fullWidth = state.fullWidth;
-  e.fullHeight = state.fullHeight;
-  e.seed = state.seed;
+  static_cast<EstimatesHead&>(e) = {state.window.width(), state.window.height(), state.window,
+                                    state.fullWidth,      state.fullHeight,      state.seed};
+  return e;
+}
+
+}  // namespace
+
+Estimates estimatesOf(const FilmState& state, bool quarters) {
+  Estimates e = estimatesHead(state);
+  const bool placed = state.placement && !state.placement->even();
   for (const EstimateState& s : state.estimates) {
-    e.estimates.push_back(estimateOf(s, quarters));
+    e.estimates.push_back(placed ? placedEstimateOf(s, *state.placement, quarters) : estimateOf(s, quarters));
     if (!s.history.empty()) e.history[s.name] = s.history;
   }
-  if (state.features) e.features = collectFeatures(*state.features);
+  if (state.features)
+    e.features =
+        placed ? collectFeatures(PlacedFeatures(*state.features, *state.placement)) : collectFeatures(*state.features);
+  return e;
+}
+
+Estimates estimatesOfHalf(const FilmState& state, int half, bool features) {
+  BRAID_ASSERT(state.placement && state.estimates.size() == 1);
+  const EstimateState& s = state.estimates.front();
+  const PlacedSums sums(s.sums, *state.placement);
+  Estimates e = estimatesHead(state);
+  Estimate& one = e.estimates.emplace_back();
+  static_cast<EstimateHead&>(one) = headOf(s);
+  one.passes = s.sums.passesInBucket(half) + s.sums.passesInBucket(half + 2);
+  one.mean = sums.halfMean(half);
+  for (int k = 0; k < 2; ++k) one.half[k] = sums.bucketMean(half + 2 * k);
+  one.variance = sums.halfVariance(half, s.lowDiscrepancy);
+  if (!state.features || !features) return e;
+  // Features have no quarters: the variance is that of the mean of both halves, twice.
+  const PlacedFeatures placed(*state.features, *state.placement);
+  e.features = collectFeatures(placed);
+  forEachFeature(*e.features, [&](auto& planes) {
+    planes.mean = planes.half[half];
+    planes.half[0] = planes.half[1] = {};
+  });
   return e;
 }
 
@@ -217,7 +271,8 @@ void addShare(FilmState& state, const FilmState& next) {
   for (size_t i = 0; i < state.estimates.size(); ++i) {
     EstimateState& e = state.estimates[i];
     const EstimateState& n = next.estimates[i];
-    if (!e.history.empty() && e.history.back().passes < e.sums.passes()) e.keepCheckpoint(stopsOf(state.identity));
+    if (!e.history.empty() && e.history.back().passes < e.sums.passes())
+      e.keepCheckpoint(stopsOf(state.identity), state.placement ? &*state.placement : nullptr);
     addSums(e.rawSums(), sumsOf(n));
     e.sums.addCounts(n.sums);
     if (e.parts) e.parts->addCounts(*n.parts);

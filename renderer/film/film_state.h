@@ -10,6 +10,7 @@
 
 #include "renderer/film/estimates.h"
 #include "renderer/film/direct_light.h"
+#include "renderer/film/sample_placement.h"
 
 namespace braid {
 
@@ -43,7 +44,8 @@ struct EstimateState {
   void addPass(uint64_t pass);
   // Adds the present variance to the history; and the image, if it is the first in the history of at least one of
   // these numbers of passes, and one that combiners improve: unbiased, with independent pixels.
-  void keepCheckpoint(const std::vector<uint64_t>& stops);
+  // `placement`: that of the film, or null.
+  void keepCheckpoint(const std::vector<uint64_t>& stops, const SamplePlacement* placement = nullptr);
 };
 
 // An option that changes pixels, under its name on the command line.
@@ -75,9 +77,10 @@ struct FilmState {
   std::vector<EstimateState> estimates;
   std::optional<FeatureAccumulator> features;
   std::optional<CoverageAccumulator> coverage;  // with a transparent background
+  std::optional<SamplePlacement> placement;     // where the only estimate has samples that differ between tiles
   std::vector<Attribute> attributes;            // of image headers, as far as they do not depend on the passes
 
-  // What does not depend on the integrator: features and coverage.
+  // What does not depend on the integrator: features, coverage and numbers of samples.
   RawSums sharedSums();
   // Rounds whose passes are all done.
   uint64_t rounds() const;
@@ -86,6 +89,10 @@ struct FilmState {
 
 // What combiners and writers see. `quarters`: also the four buckets, if there are that many.
 Estimates estimatesOf(const FilmState& state, bool quarters);
+
+// The one estimate of a film with placement as one half of its samples shows it, and nothing of the other: mean and
+// variance of the half, its two buckets as halves, the features that it saw. `features`: those too.
+Estimates estimatesOfHalf(const FilmState& state, int half, bool features);
 
 // What keeps `there` from being continued or joined by `here`: "--max-depth was 8 and is 32; ..."; empty: nothing.
 // `sameBits`: a difference of build or instruction set counts too.

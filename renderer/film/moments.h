@@ -8,6 +8,11 @@
 
 namespace braid {
 
+// Radius of the box that compares the two variance estimates, in pixels: 9 x 9. In a larger one the noisiest pixels
+// decide for more of their neighbours, while the image's sum is right with either (combiners/EXPERIMENTS.md, Box of the
+// variance ratio).
+inline constexpr int kVarianceBoxRadius = 4;
+
 // (Σv²/n - mean²)/(n - 1), never negative; zero for n < 2. What the rounding of n additions in double can produce by
 // itself (n 2⁻⁵³ mean², a relative standard deviation of 8e-8 of one pass at 64 passes and 3e-5 at 10⁷) counts as zero,
 // so that a constant has no variance.

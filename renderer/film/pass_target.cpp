@@ -93,7 +93,26 @@ void PassTarget::direct(int x, int y, const Spectrum& value) {
   direct_.set(own_[0].index(x, y), acceptable(value) ? value : Spectrum(0));
 }
 
+void PassTarget::clearFor(const std::vector<bool>& tiles) {
+  BRAID_ASSERT(splats_.empty());
+  constexpr int kTile = SamplePlacement::kTile;
+  const int columns = (width_ + kTile - 1) / kTile;
+  runs_.assign(tiles.size() / static_cast<size_t>(columns), {});
+  for (size_t t = 0; t < tiles.size(); ++t) {
+    if (!tiles[t]) continue;
+    auto& runs = runs_[t / static_cast<size_t>(columns)];
+    const int begin = static_cast<int>(t % static_cast<size_t>(columns)) * kTile, end = std::min(begin + kTile, width_);
+    if (!runs.empty() && runs.back().second == begin)
+      runs.back().second = end;
+    else
+      runs.emplace_back(begin, end);
+  }
+  rejected_ = 0;
+  clampedSplats_ = 0;
+}
+
 void PassTarget::clear() {
+  runs_.clear();
   const auto width = static_cast<size_t>(width_);
   parallelRows(height_, [&](int y) {
     const size_t begin = static_cast<size_t>(y) * width;

@@ -13,6 +13,7 @@ namespace braid {
 struct RawSum {
   std::string name;  // in state files
   Plane<double>* plane;
+  int tile = 1;  // side of the square of pixels that one value is of
 };
 
 // In the order of state files.

@@ -27,21 +27,30 @@ FilmState emptyFilm(const Plan& plan, int width, int height) {
     e.correlation = p.integrator->correlation();
     e.lowDiscrepancy = p.integrator->lowDiscrepancy(plan.settings);
     e.passesPerRound = p.passesPerRound;
-    e.sums = Accumulator(width, height, plan.buckets(), p.integrator->estimatesBias());
+    const KeptSquares squares = plan.placesSamples ? KeptSquares::Halves : KeptSquares::Together;
+    e.sums = Accumulator(width, height, plan.buckets(), p.integrator->estimatesBias(), squares);
     if (plan.kept.directIndirect && p.integrator->separatesDirectLight())
-      e.parts.emplace(width, height, plan.buckets());
+      e.parts.emplace(width, height, plan.buckets(), squares);
     film.estimates.push_back(std::move(e));
   }
   if (plan.kept.features) film.features.emplace(width, height);
   if (plan.settings.transparent) film.coverage.emplace(width, height);
+  if (plan.placesSamples) film.placement.emplace(width, height);
   return film;
 }
 
 uint64_t filmBytesPerPixel(const Plan& plan) {
   FilmState film = emptyFilm(plan, 0, 0);
-  size_t sums = film.sharedSums().size();
-  for (EstimateState& e : film.estimates) sums += e.rawSums().size();
-  return sums * sizeof(double) + passPlanes(plan).bytesPerPixel();
+  RawSums sums = film.sharedSums();
+  for (EstimateState& e : film.estimates) {
+    const RawSums more = e.rawSums();
+    sums.insert(sums.end(), more.begin(), more.end());
+  }
+  if (film.placement) film.placement->listMap(sums);
+  uint64_t perPixel = 0, perTile = 0;
+  for (const RawSum& s : sums) (s.tile == 1 ? perPixel : perTile) += sizeof(double);
+  constexpr uint64_t kTilePixels = SamplePlacement::kTile * SamplePlacement::kTile;
+  return perPixel + (perTile + kTilePixels - 1) / kTilePixels + passPlanes(plan).bytesPerPixel();
 }
 
 }  // namespace braid

@@ -37,6 +37,13 @@ struct Preparation {
   virtual std::optional<PlanLine> decision() const { return std::nullopt; }
 };
 
+// A pass that renders some tiles of the window only (SamplePlacement), and what that took.
+struct TilePass {
+  static constexpr uint64_t kNone = ~uint64_t(0);
+  std::vector<uint64_t> pass;  // by tile: whose random numbers its pixels take, or kNone: it is left out
+  std::vector<uint64_t> hits;  // by tile: surfaces that its paths met
+};
+
 // Memory of a pass besides the film, and what it is for.
 struct WorkingMemory {
   uint64_t bytes = 0;  // at most
@@ -51,6 +58,7 @@ struct PassRequest {
   PassStatistics* statistics = nullptr;
   std::vector<std::vector<RecordedRay>>* record = nullptr;  // per tile, for benchmarks; usually null
   const Preparation* preparation = nullptr;                 // of prepare(); null: the pass prepares for itself
+  TilePass* tiles = nullptr;                                // null: all pixels; of integrators that place samples
 };
 
 class Integrator {
@@ -64,6 +72,8 @@ class Integrator {
   virtual bool mayBeNegative() const { return false; }
   // Whether the passes of a bucket share a low-discrepancy sequence, for Accumulator::variance().
   virtual bool lowDiscrepancy(const Settings& settings) const { return settings.sampler == SamplerKind::Sobol; }
+  // Whether a pass can render some tiles only: its pixels depend on nothing but themselves.
+  virtual bool placesSamples() const { return false; }
   // Whether all paths of a pass have one time while the shutter is open, because paths of different pixels meet.
   virtual bool passesAreInstants() const { return false; }
   // Whether pixels share their random numbers.

@@ -6,6 +6,7 @@
 #include "renderer/core/hash.h"
 #include "renderer/session/integrator.h"
 #include "renderer/session/pixel_filter.h"
+#include "renderer/session/placement.h"
 #include "renderer/session/rendering_revision.h"
 
 namespace braid {
@@ -67,6 +68,7 @@ std::vector<StateOption> pixelOptions(const Plan& plan) {
       {"keeping features", yesOrNo(plan.kept.features)},
       {"keeping history", yesOrNo(s.keep.history)},
       {"keeping direct light", yesOrNo(plan.kept.directIndirect)}};
+  if (plan.placesSamples) list.push_back({kPlacementOption, s.placement});
   for (StateOption& stop : stopOptions(s.keep.stops)) list.push_back(std::move(stop));
   return list;
 }

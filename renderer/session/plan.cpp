@@ -11,6 +11,7 @@
 #include "renderer/session/film_of_plan.h"
 #include "renderer/session/integrator.h"
 #include "renderer/session/pixel_filter.h"
+#include "renderer/session/placement.h"
 
 namespace braid {
 
@@ -153,6 +154,28 @@ void requireShadowAlpha(const Scene& scene, const Settings& settings) {
         "--ground --transparent: only lamps light the ground, which cannot tell shadow from distance: give --env");
 }
 
+// Why all pixels get as many samples; empty: they need not.
+std::string evenBecause(const Plan& plan) {
+  const Settings& s = plan.settings;
+  if (s.placement.empty()) return "all pixels get as many samples (--place-samples)";
+  if (s.firstRound > 0) return "a share of a render does not know the sums of the others (--passes)";
+  if (plan.integrators.size() != 1) return "several integrators share the samples: all pixels get as many";
+  const Integrator& only = *plan.integrators.front().integrator;
+  if (!only.placesSamples()) return fmt::format("{} renders pixels together: all get as many samples", only.name());
+  if (s.transparent) return "alpha is of as many samples in all pixels (--transparent)";
+  return {};
+}
+
+void planPlacement(Plan& plan) {
+  const std::string even = evenBecause(plan);
+  plan.placesSamples = even.empty();
+  plan.lines.push_back(
+      {plan.placesSamples, "placement of samples",
+       plan.placesSamples
+           ? fmt::format("from sample {} on where the image errs most for its cost, --spp on average", kPilotRounds)
+           : even});
+}
+
 // What happens while the shutter is open, where one is asked for.
 void planMotion(const Scene& scene, Plan& plan) {
   const SceneMotion& motion = scene.data().motion;
@@ -199,7 +222,7 @@ void planBuffers(Plan& plan) {
   const bool separable = anySeparatesDirectLight(plan);
   KeptBuffers& kept = plan.kept;
   kept = settings.keep;
-  kept.quarters |= settings.full;
+  kept.quarters |= settings.full || plan.placesSamples;
   kept.features |= settings.full;
   kept.featureNoise = kept.features;
   kept.directIndirect = separable && (kept.directIndirect || settings.full);
@@ -220,7 +243,9 @@ void listBuffers(Plan& plan) {
     plan.lines.push_back({isKept, subject, reason});
   };
   line(kept.quarters, "quarter buckets",
-       kept.quarters ? "for outputs or combiners" : "no output or combiner reads quarters: two half buffers");
+       plan.placesSamples ? "for the placement of samples"
+       : kept.quarters    ? "for outputs or combiners"
+                          : "no output or combiner reads quarters: two half buffers");
   line(kept.features, "features",
        kept.features ? featureNames() + " for outputs or combiners" : "no output or combiner reads them");
   line(kept.directIndirect, "direct light by itself",
@@ -273,6 +298,7 @@ Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& sett
   planSceneParts(scene, settings, plan);
   planMotion(scene, plan);
   planView(scene, plan);
+  planPlacement(plan);
   plan.filmLine = plan.lines.size();
   planFilm(plan);
   return plan;

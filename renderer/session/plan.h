@@ -34,7 +34,8 @@ struct Plan {
   // What of the light in view no integrator of the plan can find, and the mend; empty where they find it. The estimated
   // error of such a render is not known: it does not see what is missing.
   std::string unreachable;
-  size_t filmLine = 0;  // of lines: where those about the film begin
+  bool placesSamples = false;  // settings.placement where it can be followed
+  size_t filmLine = 0;         // of lines: where those about the film begin
   uint64_t filmBytesPerPixel = 0;
 
   int buckets() const { return kept.quarters ? 4 : 2; }

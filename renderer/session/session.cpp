@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -71,9 +72,18 @@ class Session::Loop {
     return late;
   }
 
+  // The map for the rounds to come, where one is due: it is made anew when a run goes on from there.
+  void placeSamples() {
+    if (!film_.placement || !mapIsDue(result_.rounds)) return;
+    const Stopwatch clock;
+    cancellable(abandon_, [&] { result_.placementGain = makePlacementMap(film_, result_.rounds, session_.placeBy_); });
+    film_.estimates.front().seconds += clock.seconds();
+  }
+
   // The passes that are missing to the next round, of every integrator. False when abandoned.
   bool round() {
     const double begin = seconds();
+    placeSamples();
     for (size_t i = 0; i < plan_.integrators.size(); ++i) {
       const Stopwatch clock;
       const uint64_t wanted = (result_.rounds + 1) * static_cast<uint64_t>(plan_.integrators[i].passesPerRound);
@@ -96,6 +106,7 @@ class Session::Loop {
     p.rounds = s.spp;
     p.seconds = seconds();
     p.rejected = film_.rejected();
+    if (film_.placement) std::tie(p.fewestSamples, p.mostSamples) = film_.placement->range();
     const uint64_t done = p.round - result_.firstRound;
     if (s.spp > 0 && done > 0)
       p.secondsLeft = p.seconds / static_cast<double>(done) * static_cast<double>(s.spp - p.round);
@@ -125,20 +136,61 @@ class Session::Loop {
     EstimateState& e = film_.estimates[i];
     const uint64_t first = plan_.settings.firstRound * static_cast<uint64_t>(plan_.integrators[i].passesPerRound);
     const uint64_t pass = e.passes.empty() ? first : e.endPass();
+    if (film_.placement) return placedPass(pass);
     target_.clear();
     if (!integrator.renderPass(
             {session_.context_, plan_, pass, abandon_, &statistics_, nullptr, preparations_[i].get()}, target_))
       return false;
+    noteRejected(integrator, pass);
+    commit(i, pass, true);
+    e.addPass(pass);
+    return true;
+  }
+
+  // A pass with as many samples of every tile as it is to get: the first ones, then the second ones, and so on. The
+  // film holds whole passes: it is dropped when abandoned in the first ones, and finished later on.
+  bool placedPass(uint64_t pass) {
+    const Integrator& integrator = *plan_.integrators.front().integrator;
+    SamplePlacement& placement = *film_.placement;
+    const std::vector<int> samples = samplesOfPass(placement, pass);
+    const int most = std::max(1, *std::max_element(samples.begin(), samples.end()));
+    Plane<double>&count = placement.count[pass % 4], &hits = placement.hits[pass % 2];
+    for (int k = 0; k < most; ++k) {
+      TilePass tiles{std::vector<uint64_t>(placement.tiles(), TilePass::kNone),
+                     std::vector<uint64_t>(placement.tiles(), 0)};
+      std::vector<bool> rendered(placement.tiles());
+      for (size_t t = 0; t < placement.tiles(); ++t)
+        if (rendered[t] = samples[t] > k; rendered[t]) tiles.pass[t] = 4 * static_cast<uint64_t>(count[t]) + pass % 4;
+      target_.clearFor(rendered);
+      if (!integrator.renderPass({session_.context_, plan_, pass, k == 0 ? abandon_ : nullptr, &statistics_, nullptr,
+                                  preparations_.front().get(), &tiles},
+                                 target_))
+        return false;
+      noteRejected(integrator, pass);
+      commit(0, pass, k == 0);
+      for (size_t t = 0; t < placement.tiles(); ++t) {
+        count[t] += samples[t] > k ? 1 : 0;
+        hits[t] += static_cast<double>(tiles.hits[t]);
+      }
+    }
+    film_.estimates.front().addPass(pass);
+    return true;
+  }
+
+  void noteRejected(const Integrator& integrator, uint64_t pass) {
     const int64_t rejected = statistics_.rejectedPixel.load();
     if (rejected >= 0 && !result_.firstRejected)
       result_.firstRejected = {integrator.name(), pass, static_cast<int>(rejected % plan_.settings.width),
                                static_cast<int>(rejected / plan_.settings.width)};
-    e.sums.commit(pass, target_);
-    if (e.parts) e.parts->commit(pass, target_);
-    e.addPass(pass);
-    if (i == 0 && film_.features) film_.features->commit(pass, target_);
+  }
+
+  // `counts`: not more samples of a pass that is among the sums already.
+  void commit(size_t i, uint64_t pass, bool counts) {
+    EstimateState& e = film_.estimates[i];
+    e.sums.commit(pass, target_, counts);
+    if (e.parts) e.parts->commit(pass, target_, counts);
+    if (i == 0 && film_.features) film_.features->commit(pass, target_, counts);
     if (i == 0 && film_.coverage) film_.coverage->commit(target_);
-    return true;
   }
 
   Session& session_;
@@ -214,6 +266,7 @@ RunReport Session::advance(const ProgressCallback& progress, const std::atomic<b
   result.shadowRays = statistics.shadowRays;
   result.rejected = film_.rejected();
   result.spp = film_.estimates.front().sums.passes();
+  if (film_.placement) std::tie(result.fewestSamples, result.mostSamples) = film_.placement->range();
   return result;
 }
 
@@ -242,7 +295,7 @@ void Session::keepCheckpoints() {
   // The passes before a later share are not its own: where the stop lies is known when shares are added.
   const std::vector<uint64_t> stops =
       plan_.settings.firstRound > 0 ? std::vector<uint64_t>{} : plan_.settings.keep.stops;
-  for (EstimateState& e : film_.estimates) e.keepCheckpoint(stops);
+  for (EstimateState& e : film_.estimates) e.keepCheckpoint(stops, film_.placement ? &*film_.placement : nullptr);
 }
 
 }  // namespace braid

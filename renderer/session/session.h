@@ -13,6 +13,7 @@
 #include "renderer/core/log.h"
 #include "renderer/film/film_state.h"
 #include "renderer/session/integrator.h"
+#include "renderer/session/placement.h"
 #include "renderer/session/plan.h"
 
 namespace braid {
@@ -26,15 +27,19 @@ struct Progress {
   double seconds = 0;       // since the loop started
   double secondsLeft = -1;  // estimate, negative: unknown
   uint64_t rejected = 0;
+  // Where samples are placed: the fewest and the most of a pixel so far; else 0.
+  uint64_t fewestSamples = 0, mostSamples = 0;
 };
 
 // What became of a run, without its images.
 struct RunReport {
   StopReason reason = StopReason::Samples;
-  uint64_t rounds = 0;      // those of a resumed state included
-  uint64_t firstRound = 0;  // how many of them were resumed
-  uint64_t spp = 0;         // of the first integrator, in all
-  double seconds = 0;       // of the pass loop, in this run
+  uint64_t rounds = 0;                          // those of a resumed state included
+  uint64_t firstRound = 0;                      // how many of them were resumed
+  uint64_t spp = 0;                             // of the first integrator, in all
+  uint64_t fewestSamples = 0, mostSamples = 0;  // Progress
+  double placementGain = 0;  // that the last map of this run predicts (makePlacementMap()); 0: no map was made
+  double seconds = 0;        // of the pass loop, in this run
   uint64_t paths = 0, rays = 0, shadowRays = 0;
   uint64_t rejected = 0;
   // One rejected sample, if any, so that its path can be replayed.
@@ -77,6 +82,10 @@ class Session {
   // rounds.
   void setTimeLeft(std::function<double()> timeLeft) { timeLeft_ = std::move(timeLeft); }
 
+  // Where the plan places samples, the errors that say where; else, and by default, those of the samples alone. Made of
+  // settings.placement, by which states are told apart.
+  void placeBy(RelativeErrors errors) { placeBy_ = std::move(errors); }
+
   const Plan& plan() const { return plan_; }
   const TransportContext& context() const { return context_; }
 
@@ -104,6 +113,7 @@ class Session {
   TransportContext context_;
   FilmState film_;
   std::function<double()> timeLeft_;  // or none: by the settings
+  RelativeErrors placeBy_ = varianceOverBrightness;
 };
 
 }  // namespace braid

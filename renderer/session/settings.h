@@ -39,8 +39,11 @@ struct Settings {
   float photonRadius = 5;              // of the first passes, in pixels as seen from the camera
   bool photonDirect = false;           // direct light by photons too, not by next-event estimation
   bool photonAiming = true;            // choose lights also by whether their photons arrive where the camera looks
-  bool full = false;                   // leave nothing out
-  int threads = 0;                     // 0: all that the process may use
+  // Whose estimated error says where samples go (renderer/README.md, Placement of samples): a method's, or "none" for
+  // that of the samples alone; empty: all pixels get as many.
+  std::string placement;
+  bool full = false;  // leave nothing out
+  int threads = 0;    // 0: all that the process may use
 };
 
 }  // namespace braid

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "braid/place_samples.h"
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
 #include "renderer/film/files/output_file.h"
@@ -142,6 +143,9 @@ int runPlan(PlanOptions o) {
   settings.keep = o.image.buffers();
   settings.transparent = o.transparent;
   const bool shares = o.tasks > 0;
+  if (o.samples.placeSamples && shares)
+    throw Error(ExitCode::Usage, "--place-samples: a share does not know the sums of the others: leave out --tasks");
+  if (o.samples.placeSamples) settings.placement = placementFor(o.image.combine.methods);
   if (shares) splitPasses(settings.spp, o.tasks);  // wrong numbers before the scene is loaded
   const PreparedRender render =
       prepareRender(o.scene, settings, o.image.combine, {settings.spp, shares || !o.checkpoint.empty()});
@@ -199,6 +203,7 @@ void addPlan(CLI::App& app, Action& action) {
   o.renderOptions = added(*command, [&] {
     addSceneOptions(*command, o.scene);
     addSampleOptions(*command, o.samples);
+    addPlacement(*command, o.samples);
   });
   o.frameOptions = added(*command, [&] { addFrameRangeOptions(*command, o.frames); });
   o.imageOptions = added(*command, [&] { addImageOptions(*command, o.image); });

@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "braid/place_samples.h"
 #include "renderer/core/error.h"
 #include "renderer/core/stopwatch.h"
 #include "renderer/film/files/output_file.h"
@@ -47,6 +48,7 @@ Settings previewSettings(const PreviewOptions& o) {
   Settings settings = makeSettings(o.scene, o.samples);
   if (o.samples.spp == 0 && o.samples.seconds == 0) settings.spp = 0;  // until it is stopped
   settings.keep = o.image.buffers();
+  if (o.samples.placeSamples) settings.placement = placementFor(o.image.combine.methods);
   return settings;
 }
 
@@ -222,6 +224,7 @@ void addPreview(CLI::App& app, Action& action) {
   command->footer(kPreviewHints);
   addSceneOptions(*command, o.scene);
   addSampleOptions(*command, o.samples);
+  addPlacement(*command, o.samples);
   addImageOptions(*command, o.image);
   command
       ->add_option("--http", o.port,

@@ -71,6 +71,7 @@ void addRender(CLI::App& app, Action& action) {
   addSceneOptions(*command, o.scene);
   addFrameRangeOptions(*command, o.frames);
   addSampleOptions(*command, o.samples);
+  addPlacement(*command, o.samples);
   addImageOptions(*command, o.image);
   command->add_flag("--transparent", o.transparent, "Alpha channel; camera rays that miss add nothing");
   command->add_option("--error", o.error, "Stop at this estimated relative error (relL2 of `compare`)")

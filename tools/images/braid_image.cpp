@@ -75,6 +75,8 @@ Estimate readEstimate(const ImageFile& file, const std::string& layer, const std
     if (const std::string quarter = layer + '.' + quarterName(q); hasLayer(file, quarter))
       e.quarter.push_back(file.rgb(quarter));
   const std::string prefix = "braid/" + name + "/";
+  const auto samples = file.planes.find(layer.substr(0, layer.size() - name.size()) + "SampleCount.Y");
+  if (samples != file.planes.end()) e.samples = samples->second;
   e.unbiased = integerOr(file, prefix + "unbiased", 1) != 0;
   e.passes = static_cast<uint64_t>(std::max<int64_t>(0, integerOr(file, prefix + "passes", 0)));
   if (const Attribute* seconds = findAttribute(file, prefix + "seconds")) e.seconds = seconds->number;

@@ -178,6 +178,11 @@ void addSampleOptions(CLI::App& command, SampleChoice& c) {
   showFirst(command, kSampleHelp, {"--integrator", "--spp", "--time", "--max-depth", "--seed", "--threads"});
 }
 
+void addPlacement(CLI::App& command, SampleChoice& c) {
+  command.add_flag("--place-samples", c.placeSamples,
+                   "Send the samples of pt where the combined image errs most for what they cost, --spp on average");
+}
+
 Settings makeSettings(const SceneChoice& scene, const SampleChoice& samples) {
   Settings s;
   s.width = scene.size.width;

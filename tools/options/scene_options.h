@@ -54,11 +54,15 @@ struct SampleChoice {
   uint64_t seed = 0;
   int threads = 0;
   double clamp = 0;
+  bool placeSamples = false;  // of commands with addPlacement()
   uint64_t photons = 0;
   double photonRadius = 5;
   bool photonDirect = false, noPhotonAiming = false;
 };
 void addSampleOptions(CLI::App& command, SampleChoice& choice);
+
+// --place-samples, of commands that can.
+void addPlacement(CLI::App& command, SampleChoice& choice);
 
 // --size and --sampler, of commands that take no others of these groups.
 CLI::Option* addSize(CLI::App& command, FrameSize& size, const char* description = "Frame in pixels");

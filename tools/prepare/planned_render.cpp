@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "braid/place_samples.h"
 #include "braid/plan_combining.h"
 #include "tools/options/memory_limit.h"
 
@@ -51,7 +52,7 @@ PlannedRender planRender(const Scene& scene, const CameraData& camera, const Set
                          const std::vector<const Integrator*>& integrators, CombineChoice& choice,
                          RenderExtent extent) {
   PlannedRender p;
-  const Plan bare = makePlan(scene, camera, settings, integrators);
+  Plan bare = makePlan(scene, camera, settings, integrators);
   const auto planAgain = [&] {
     p.plan = bare;
     if (extent.resumed && !choice.asked && !choice.methods.empty())
@@ -74,6 +75,7 @@ PlannedRender planRender(const Scene& scene, const CameraData& camera, const Set
   if (!p.note.empty()) {
     choice.methods.clear();
     p.without.clear();
+    if (!extent.resumed && bare.placesSamples) bare.settings.placement = placementFor(choice.methods);
     planAgain();  // denoisers may have been named
   }
   if (extent.goesOn && !extent.resumed) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/prepare/prepared_render.h"
 
+#include "braid/place_samples.h"
 #include "integrators/registry.h"
 #include "tools/images/exr_metadata.h"
 #include "tools/prepare/scene_identity.h"
@@ -24,6 +25,7 @@ std::unique_ptr<Session> beginSession(const PreparedRender& render, const SceneC
   requireWithinLimit(render.planned.memory);
   const Scene& scene = render.scene();
   auto session = std::make_unique<Session>(scene, render.planned.plan);
+  if (session->plan().placesSamples) session->placeBy(errorsForPlacement(session->plan().settings.placement));
   session->identify(BRAID_VERSION, BRAID_BUILD_FLAGS, sceneIdentity(choice, scene.data()),
                     planAttributes(scene, session->plan(), scene.accel().isa()));
   return session;

@@ -45,6 +45,9 @@ nlohmann::json resultRecord(const FinishedRender& render, const RenderOptions& o
   return {{"status", r.reason == StopReason::Cancelled ? "interrupted" : "done"},
           {"reason", toString(r.reason)},
           {"spp", r.spp},
+          {"fewestSamples", r.mostSamples > 0 ? r.fewestSamples : r.spp},
+          {"mostSamples", r.mostSamples > 0 ? r.mostSamples : r.spp},
+          {"placementGain", r.placementGain > 0 ? nlohmann::json(r.placementGain) : nullptr},
           {"estimatedError", errorOrNull(render.written.error)},
           {"exposure", render.written.tone ? nlohmann::json(render.written.tone->exposureStops) : nullptr},
           {"seconds",
@@ -70,6 +73,9 @@ void sayResult(const FinishedRender& render, const RenderOptions& o) {
   if (r.firstRejected) fmt::print(stderr, "one of them: {}\n", describe(*r.firstRejected, o));
   for (const PlanLine& line : r.decisions)
     fmt::print(stderr, "{} {}: {}\n", line.kept ? '+' : '-', line.subject, line.reason);
+  if (r.placementGain > 0)
+    fmt::print(stderr, "{} to {} samples a pixel, by which {:.2f} times less error is expected\n", r.fewestSamples,
+               r.mostSamples, r.placementGain);
   for (const std::string& text : written.timings) fmt::print(stderr, "{}\n", text);
   if (written.tone) fmt::print(stderr, "{}\n", describe(*written.tone));
   std::string outputs;

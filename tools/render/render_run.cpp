@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "braid/place_samples.h"
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
 #include "renderer/film/files/output_file.h"
@@ -29,6 +30,9 @@ Settings renderSettings(const RenderOptions& o) {
   settings.keep = o.image.buffers();
   settings.transparent = o.transparent;
   if (o.error > 0 && o.samples.spp == 0 && o.samples.seconds == 0) settings.spp = 0;
+  if (o.samples.placeSamples && o.passes)
+    throw Error(ExitCode::Usage, "--place-samples: a share does not know the sums of the others: leave out --passes");
+  if (o.samples.placeSamples) settings.placement = placementFor(o.image.combine.methods);
   if (!o.passes) return settings;
   if (o.samples.spp > 0) throw Error(ExitCode::Usage, "--spp and --passes: --passes alone says how many");
   settings.firstRound = o.passes->begin;

@@ -8,6 +8,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/film/files/state_file.h"
+#include "renderer/session/placement.h"
 #include "tools/options/file_uses.h"
 
 namespace braid {
@@ -76,6 +77,9 @@ void keepAsBefore(const FilmState& state, Settings& settings) {
     settings.keep.history |= option == StateOption{"keeping history", "on"};
   for (const EstimateState& e : state.estimates) settings.keep.directIndirect |= e.parts.has_value();
   settings.keep.stops = stopsOf(state.identity);
+  if (!settings.placement.empty()) return;
+  for (const StateOption& option : state.identity.options)
+    if (option.name == kPlacementOption) settings.placement = option.value;
 }
 
 }  // namespace braid

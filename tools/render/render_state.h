@@ -22,7 +22,8 @@ std::optional<FilmState> earlierState(const RenderOptions& options, const Settin
 // Whether the checkpoint of --passes, or of --spp, holds all of them already.
 bool holdsAllPasses(const RenderOptions& options);
 
-// What an earlier run kept is kept on, whether or not this one's outputs need it.
+// What an earlier run kept is kept on, whether or not this one's outputs need it; and samples go where they went,
+// unless they are to be placed now.
 void keepAsBefore(const FilmState& state, Settings& settings);
 
 }  // namespace braid

@@ -42,6 +42,7 @@ void ProgressLine::update(const Progress& p) {
   const std::string total = p.rounds > 0 ? fmt::format("/{}", p.rounds) : "";
   std::string text =
       fmt::format("{}{} spp  {}  ETA {}", p.round, total, formatSeconds(p.seconds), formatSeconds(p.secondsLeft));
+  if (p.mostSamples > p.fewestSamples) text += fmt::format("  {} to {} a pixel", p.fewestSamples, p.mostSamples);
   if (p.rejected > 0) text += fmt::format("  {} samples rejected", p.rejected);
   if (!terminal_) {
     fmt::print(stderr, "rendering: {}\n", text);

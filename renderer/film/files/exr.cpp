@@ -103,6 +103,8 @@ std::vector<ExrChannel> namedPlanes(const Estimates& estimates, const Rgb<float>
   if (options.aovs == AovSet::Features)
     for (const ExrLayer& layer : options.layers)
       if (layer.name == "Error" && layer.plane) channels.add(layer.name, "Y", *layer.plane);
+  if (options.aovs != AovSet::None)
+    for (const Estimate& e : estimates.estimates) channels.add("SampleCount", "Y", e.samples);
   if (!all) return channels.list();
   for (const Estimate& e : estimates.estimates) {
     addEstimate(channels, e, options);

@@ -2,6 +2,7 @@
 #include "renderer/film/files/state_file.h"
 
 #include <bit>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -98,17 +99,28 @@ std::vector<PlaneEntry> readHeader(Reader& in, const std::string& path, FilmStat
   HistoryImages images;
   parseStateHeader(path, header, state, images);
   std::vector<PlaneEntry> table = planeTable(state, images);
-  uint64_t bytesOfPixel = 0;
-  for (const PlaneEntry& p : table) bytesOfPixel += p.bytesPerValue();
-  const auto pixels = static_cast<uint64_t>(state.window.width()) * static_cast<uint64_t>(state.window.height());
-  if (bytesOfPixel * pixels != planeBytes) in.fail("the planes do not have the size of the image: use another copy");
+  uint64_t bytes = 0;
+  for (const PlaneEntry& p : table) bytes += p.bytes(state.window.width(), state.window.height());
+  if (bytes != planeBytes) in.fail("the planes do not have the size of the image: use another copy");
   return table;
 }
 
 template <class T>
-void readPlane(Reader& in, const FilmState& state, Plane<T>& plane) {
-  plane = Plane<T>(state.window.width(), state.window.height());
+void readPlane(Reader& in, const FilmState& state, const PlaneEntry& entry, Plane<T>& plane) {
+  plane = Plane<T>(entry.columns(state.window.width()), entry.columns(state.window.height()));
   in.read(plane.data.data(), plane.size() * sizeof(T));
+}
+
+// Whether numbers of samples, hits and weights are such as a render makes.
+bool isPossible(SamplePlacement& placement) {
+  RawSums list;
+  placement.listSums(list);
+  const size_t whole = list.size();
+  placement.listMap(list);
+  for (size_t p = 0; p < list.size(); ++p)
+    for (const double v : list[p].plane->data)
+      if (!(v >= 0 && v <= static_cast<double>(kMaxPass)) || (p < whole && v != std::floor(v))) return false;
+  return true;
 }
 
 }  // namespace
@@ -153,14 +165,16 @@ FilmState readStateFile(const std::string& path) {
   FilmState state;
   for (const PlaneEntry& p : readHeader(in, path, state))
     if (p.sum)
-      readPlane(in, state, *p.sum);
+      readPlane(in, state, p, *p.sum);
     else
-      readPlane(in, state, *p.image);
+      readPlane(in, state, p, *p.image);
   const std::string computed = in.checksum();
   char stored[kChecksumBytes] = {};
   in.read(stored, sizeof stored);
   if (computed + '\n' != std::string(stored, sizeof stored))
     in.fail("is damaged: its checksum is not that of its content: use another copy");
+  if (state.placement && !isPossible(*state.placement))
+    in.fail("holds impossible numbers of samples: use another copy, or render again");
   return state;
 }
 

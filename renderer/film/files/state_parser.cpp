@@ -35,9 +35,10 @@ void parseEstimate(Line& line, FilmState& state, HistoryImages& images) {
   e.passesPerRound = line.integer(1, 65536);
   e.seconds = line.seconds();
   const uint64_t rejected = line.count(~uint64_t(0)), clampedSplats = line.count(~uint64_t(0));
-  e.sums = Accumulator(0, 0, state.buckets, line.flag());
+  const KeptSquares squares = state.placement ? KeptSquares::Halves : KeptSquares::Together;
+  e.sums = Accumulator(0, 0, state.buckets, line.flag(), squares);
   e.sums.setCounts(std::vector<uint64_t>(static_cast<size_t>(state.buckets), 0), rejected, clampedSplats);
-  if (line.flag()) e.parts.emplace(0, 0, state.buckets);
+  if (line.flag()) e.parts.emplace(0, 0, state.buckets, squares);
   for (const EstimateState& other : state.estimates)
     if (other.name == e.name) line.fail("the estimate " + e.name + " appears twice");
   state.estimates.push_back(std::move(e));
@@ -168,6 +169,7 @@ constexpr std::array kWords = {
     Word{"checkpoint", parseCheckpoint},
     Word{"features", parseFeatures},
     Word{"coverage", parseCoverage},
+    Word{"placement", [](Line&, Parsed& p) { p.state.placement.emplace(); }},
     Word{"plane", parsePlane},
 };
 
@@ -192,6 +194,11 @@ void parseStateHeader(const std::string& file, const std::string& text, FilmStat
     begin = end + 1;
   }
   const Line last(file, number, "");
+  if (state.placement) {
+    if (state.estimates.size() != 1 || state.buckets != 4) last.fail("placement of samples without its four buckets");
+    state.placement->width = state.window.width();
+    state.placement->height = state.window.height();
+  }
   if (state.window.width() <= 0) last.fail("no pixels");
   if (state.estimates.empty()) last.fail("no estimate");
   counted.resize(state.estimates.size());

@@ -48,7 +48,7 @@ std::string estimateLines(const EstimateState& e) {
 std::vector<PlaneEntry> planeTable(FilmState& state, const HistoryImages& images) {
   std::vector<PlaneEntry> table;
   const auto add = [&](const RawSums& sums) {
-    for (const RawSum& s : sums) table.push_back({s.name, s.plane, nullptr});
+    for (const RawSum& s : sums) table.push_back({s.name, s.plane, nullptr, s.tile});
   };
   for (size_t i = 0; i < state.estimates.size(); ++i) {
     EstimateState& e = state.estimates[i];
@@ -61,6 +61,11 @@ std::vector<PlaneEntry> planeTable(FilmState& state, const HistoryImages& images
       }
   }
   add(state.sharedSums());
+  if (state.placement) {
+    RawSums map;
+    state.placement->listMap(map);
+    add(map);
+  }
   return table;
 }
 
@@ -82,6 +87,7 @@ std::string stateHeader(const FilmState& s) {
   for (const StateOption& o : s.identity.options)
     text += fmt::format("option {} {}\n", escapedWord(o.name), escapedWord(o.value));
   for (const Attribute& a : s.attributes) text += attributeLine(a) + '\n';
+  if (s.placement) text += "placement\n";
   for (const EstimateState& e : s.estimates) text += estimateLines(e);
   if (s.features) text += fmt::format("features {} {}\n", s.features->passesInHalf(0), s.features->passesInHalf(1));
   if (s.coverage) text += fmt::format("coverage {}\n", s.coverage->passes());

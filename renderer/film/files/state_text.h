@@ -17,7 +17,13 @@ struct PlaneEntry {
   std::string name;
   Plane<double>* sum = nullptr;
   Plane<float>* image = nullptr;
+  int tile = 1;  // RawSum::tile
   size_t bytesPerValue() const { return sum ? sizeof(double) : sizeof(float); }
+  int columns(int width) const { return (width + tile - 1) / tile; }
+  // In a file of an image of so many pixels.
+  uint64_t bytes(int width, int height) const {
+    return bytesPerValue() * static_cast<uint64_t>(columns(width)) * static_cast<uint64_t>(columns(height));
+  }
 };
 
 // The planes of a state in the order of files. `state` may hold accumulators of no pixels, for files that are about to
