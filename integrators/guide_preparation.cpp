@@ -251,8 +251,8 @@ Applies guidingApplies(const Plan& plan) {
   if (s.guiding == Guiding::Off) return {false, "on request"};
   if (s.maxDepth < 3) return {false, "paths scatter once at most"};
   if (s.guiding == Guiding::On) return {true, "on request"};
-  // TRAP: trial passes are independent. These points serve unguided paths so much better than guided ones, whose choices
-  // cut their patterns up, that a promise by independent ones is not kept.
+  // TRAP: trial passes are independent. These points serve unguided paths so much better than guided ones, whose
+  // choices cut their patterns up, that a promise by independent ones is not kept.
   if (s.sampler == SamplerKind::Sobol)
     return {false, "with Sobol' points it has not paid on any scene (--guiding on, or --sampler independent)"};
   if (static_cast<uint64_t>(s.width) * static_cast<uint64_t>(s.height) < kFewestPixels)

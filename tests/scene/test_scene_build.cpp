@@ -127,7 +127,8 @@ TEST_CASE("Traits name what a scene contains and nothing else") {
   CHECK(lobesWith([](Material& m) { m.clearcoat = 1; }) == (kLobeDiffuse | kLobeClearcoat));
   CHECK(with([](Material& m) { m.clearcoat = 1; }) == kTraitSmoothSpecular);
   CHECK(with([](Material& m) { m.unlit = true; }) == kTraitUnlit);
-  CHECK(lobesWith([](Material& m) { m.transmission = 1; }) == (kLobeSpecular | kLobeTransmission));
+  CHECK(lobesWith([](Material& m) { m.transmission = 1; }) == (kLobeSpecular | kLobeTransmission | kLobeMultiScatter));
+  CHECK(lobesWith([](Material& m) { m.transmission = 1, m.roughness = 0; }) == (kLobeSpecular | kLobeTransmission));
   CHECK(lobesWith([](Material& m) { m.unlit = true; }) == 0);
   CHECK(with([](Material& m) { m.transmission = 1, m.thinWalled = false; }) == kTraitVolume);
 

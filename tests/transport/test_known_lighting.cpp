@@ -235,7 +235,7 @@ TEST_CASE("known light: a glossy floor under small and large lights, where eithe
       const Vec3 centre(0, 1.5f, -1.5f);
       addLight(data, centre + Vec3(-half, 0, -half), {2 * half, 0, 0}, {0, 0, 2 * half}, Spectrum(1));
       SurfaceParameters p;
-      p.lobes = kLobeDiffuse | kLobeSpecular;
+      p.lobes = kLobeDiffuse | kLobeSpecular | kLobeMultiScatter;
       p.baseColor = m.baseColor;
       p.metallic = m.metallic;
       p.roughness = roughness;

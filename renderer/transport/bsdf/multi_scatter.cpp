@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "renderer/transport/bsdf/fresnel.h"
@@ -146,27 +147,28 @@ const MetalTable& metalTable() {
 
 enum class GlassSide : uint8_t { Outside, Inside, Thin };
 
-std::array<Rows, kIndices> buildGlass(GlassSide side) {
-  std::array<Rows, kIndices> table;
-  for (size_t i = 0; i < kIndices; ++i) {
-    // At the first one light goes straight on, but for what microfacets shadow.
-    const float x = std::max(kMostIndex * sqr(static_cast<float>(i) / (kIndices - 1)), 1e-4f);
-    const float eta = (1 + x) / (1 - x);
-    for (size_t r = 0; r < kRows; ++r)
-      for (size_t c = 0; c < kColumns; ++c)
-        table[i][r][c] = whiteGlassAlbedo(alphaOf(r), cosineOf(c), side == GlassSide::Inside ? 1 / eta : eta,
-                                          side == GlassSide::Thin);
-  }
-  return table;
+Rows buildGlass(GlassSide side, size_t index) {
+  // At the first one light goes straight on, but for what microfacets shadow.
+  const float x = std::max(kMostIndex * sqr(static_cast<float>(index) / (kIndices - 1)), 1e-4f);
+  const float eta = (1 + x) / (1 - x);
+  Rows rows;
+  for (size_t r = 0; r < kRows; ++r)
+    for (size_t c = 0; c < kColumns; ++c)
+      rows[r][c] =
+          whiteGlassAlbedo(alphaOf(r), cosineOf(c), side == GlassSide::Inside ? 1 / eta : eta, side == GlassSide::Thin);
+  return rows;
 }
 
-const std::array<Rows, kIndices>& glassTable(const GlassPlace& place) {
-  if (place.thin) {
-    static const auto thin = buildGlass(GlassSide::Thin);
-    return thin;
-  }
-  static const auto outside = buildGlass(GlassSide::Outside), inside = buildGlass(GlassSide::Inside);
-  return place.inside ? inside : outside;
+// Of one index, when it is first asked for: a scene has few of them, and all would take a fifth of a second.
+const Rows& glassRows(GlassSide side, size_t index) {
+  struct Table {
+    std::array<Rows, kIndices> rows;
+    std::array<std::once_flag, kIndices> built;
+  };
+  static std::array<Table, 3> tables;
+  Table& table = tables[static_cast<size_t>(side)];
+  std::call_once(table.built[index], [&] { table.rows[index] = buildGlass(side, index); });
+  return table.rows[index];
 }
 
 }  // namespace
@@ -192,10 +194,10 @@ GlassPlace glassPlace(float alpha, float eta, bool thin) {
 }
 
 float glassAlbedo(const GlassPlace& place, float cosine) {
-  const std::array<Rows, kIndices>& table = glassTable(place);
+  const GlassSide side = place.thin ? GlassSide::Thin : place.inside ? GlassSide::Inside : GlassSide::Outside;
   const TableRow column = columnOf(cosine);
   const auto i = static_cast<size_t>(place.index.row);
-  return glm::mix(inRows(table[i], place.alpha, column), inRows(table[i + 1], place.alpha, column),
+  return glm::mix(inRows(glassRows(side, i), place.alpha, column), inRows(glassRows(side, i + 1), place.alpha, column),
                   place.index.fraction);
 }
 

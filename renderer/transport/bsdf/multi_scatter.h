@@ -15,7 +15,7 @@
 
 namespace braid {
 
-// Tables are built once, on first use, by fixed quadrature; constant afterwards.
+// Tables are built by fixed quadrature, each part once, when it is first used.
 
 // c of a direction on a metal, by its cosine; the row is that of alpha.
 TableRow metalScatterRow(float alpha);

@@ -109,7 +109,7 @@ TEST_CASE("Frames that are killed are gone on from, and equal those of a run tha
   };
   const auto start = [&](const char* stem, std::vector<std::string> more) {
     more.insert(more.end(),
-                {"--size", "48x32", "--spp", "64", "--threads", "2", "--reproducible", "--look-at",
+                {"--size", "48x32", "--spp", "256", "--threads", "2", "--reproducible", "--look-at",
                  "0.5,0.5,3,0.5,0.5,0", "--frames", "0:24", "--fps", "24", "-o", named(stem, "##", ".exr")});
     return std::make_unique<test::Process>(more, "render", "", scene);
   };
@@ -130,7 +130,7 @@ TEST_CASE("Frames that are killed are gone on from, and equal those of a run tha
     CHECK(process->wait() == (signal == SIGKILL ? -SIGKILL : signal == SIGTERM ? 130 : 0));
     for (const test::Json& r : test::records(log, "frame")) CHECK(r["finished"] == (r["frame"] < finished));
     // The first round of the frame that was cut off, unless it was finished just before.
-    if (kept > 0 && kept < 64) resumed += test::records(log, "progress").at(0)["spp"] > kept;
+    if (kept > 0 && kept < 256) resumed += test::records(log, "progress").at(0)["spp"] > kept;
     finished = frame + (signal != 0 && std::filesystem::exists(named("out", number, ".exr")));
     kept = signal != 0 ? readStateHeader(state).rounds() : 0;
   }
