@@ -17,7 +17,7 @@ namespace braid {
 namespace {
 
 // Rows are uniform in sqrt(alpha), columns in sqrt(cosine), indices in the root of (η - 1) / (η + 1), up to η = 3.
-constexpr size_t kRows = 20, kColumns = 32, kIndices = 11;
+constexpr size_t kAlphas = 20, kCosines = 32, kIndices = 11;
 constexpr float kMostIndex = 0.5f;
 constexpr int kIterations = 40;
 
@@ -29,8 +29,8 @@ constexpr Cells kMetalCells = {20, 24}, kGlassCells = {8, 24};
 // From within a solid, where total reflection begins abruptly.
 constexpr Cells kInsideCells = {32, 28};
 
-using Columns = std::array<float, kColumns>;
-using Rows = std::array<Columns, kRows>;
+using Columns = std::array<float, kCosines>;
+using Rows = std::array<Columns, kAlphas>;
 
 TableRow placeIn(float coordinate, size_t count) {
   const float x = glm::clamp(coordinate, 0.0f, 1.0f) * static_cast<float>(count - 1);
@@ -38,11 +38,11 @@ TableRow placeIn(float coordinate, size_t count) {
   return {i, x - static_cast<float>(i)};
 }
 
-TableRow columnOf(float cosine) { return placeIn(std::sqrt(std::max(cosine, 0.0f)), kColumns); }
+TableRow columnOf(float cosine) { return placeIn(std::sqrt(std::max(cosine, 0.0f)), kCosines); }
 
-float cosineOf(size_t column) { return std::max(sqr(static_cast<float>(column) / (kColumns - 1)), 1e-4f); }
+float cosineOf(size_t column) { return std::max(sqr(static_cast<float>(column) / (kCosines - 1)), 1e-4f); }
 
-float alphaOf(size_t row) { return std::max(sqr(static_cast<float>(row) / (kRows - 1)), Ggx::kMinAlpha); }
+float alphaOf(size_t row) { return std::max(sqr(static_cast<float>(row) / (kAlphas - 1)), Ggx::kMinAlpha); }
 
 float along(const Columns& columns, const TableRow& at) {
   const auto c = static_cast<size_t>(at.row);
@@ -86,8 +86,8 @@ Columns metalFactors(float alpha) {
     float share;
   };
   const Ggx ggx{alpha, alpha};
-  std::array<std::vector<Arrival>, kColumns> arrivals;
-  for (size_t c = 0; c < kColumns; ++c) {
+  std::array<std::vector<Arrival>, kCosines> arrivals;
+  for (size_t c = 0; c < kCosines; ++c) {
     const Vec3 wo = directionOf(cosineOf(c));
     forVisibleNormals(ggx, wo, kMetalCells, [&](const Vec3& h, float oh, float weight) {
       const Vec3 wi = 2 * oh * h - wo;
@@ -98,7 +98,7 @@ Columns metalFactors(float alpha) {
   factors.fill(1);
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     const Columns before = factors;
-    for (size_t c = 0; c < kColumns; ++c) {
+    for (size_t c = 0; c < kCosines; ++c) {
       float received = 0;
       for (const Arrival& a : arrivals[c]) received += a.share * along(before, a.column);
       factors[c] = std::sqrt(before[c] / received);
@@ -129,13 +129,13 @@ float whiteGlassAlbedo(float alpha, float cosine, float eta, bool thin) {
 
 struct MetalTable {
   Rows factor;
-  std::array<float, kRows> meanAlbedo;
+  std::array<float, kAlphas> meanAlbedo;
 };
 
 const MetalTable& metalTable() {
   static const auto built = [] {
     auto table = std::make_unique<MetalTable>();
-    for (size_t r = 0; r < kRows; ++r) {
+    for (size_t r = 0; r < kAlphas; ++r) {
       table->factor[r] = metalFactors(alphaOf(r));
       const GgxAlbedo mean = ggxMeanAlbedo(ggxTableRow(alphaOf(r)));
       table->meanAlbedo[r] = mean.f0 + mean.f90;
@@ -152,8 +152,8 @@ Rows buildGlass(GlassSide side, size_t index) {
   const float x = std::max(kMostIndex * sqr(static_cast<float>(index) / (kIndices - 1)), 1e-4f);
   const float eta = (1 + x) / (1 - x);
   Rows rows;
-  for (size_t r = 0; r < kRows; ++r)
-    for (size_t c = 0; c < kColumns; ++c)
+  for (size_t r = 0; r < kAlphas; ++r)
+    for (size_t c = 0; c < kCosines; ++c)
       rows[r][c] =
           whiteGlassAlbedo(alphaOf(r), cosineOf(c), side == GlassSide::Inside ? 1 / eta : eta, side == GlassSide::Thin);
   return rows;
@@ -173,14 +173,14 @@ const Rows& glassRows(GlassSide side, size_t index) {
 
 }  // namespace
 
-TableRow metalScatterRow(float alpha) { return placeIn(std::sqrt(alpha), kRows); }
+TableRow metalScatterRow(float alpha) { return placeIn(std::sqrt(alpha), kAlphas); }
 
 float metalScatterFactor(const TableRow& row, float cosine) {
   return inRows(metalTable().factor, row, columnOf(cosine));
 }
 
 Spectrum metalScatterColour(const TableRow& row, const Spectrum& f0) {
-  const std::array<float, kRows>& mean = metalTable().meanAlbedo;
+  const std::array<float, kAlphas>& mean = metalTable().meanAlbedo;
   const auto r = static_cast<size_t>(row.row);
   const float e = glm::mix(mean[r], mean[r + 1], row.fraction);
   const Spectrum f = f0 + (1.0f - f0) * (1.0f / 21);  // Schlick's mean
@@ -189,7 +189,7 @@ Spectrum metalScatterColour(const TableRow& row, const Spectrum& f0) {
 
 GlassPlace glassPlace(float alpha, float eta, bool thin) {
   const float x = (eta - 1) / (eta + 1);
-  return {placeIn(std::sqrt(alpha), kRows), placeIn(std::sqrt(std::fabs(x) / kMostIndex), kIndices), thin,
+  return {placeIn(std::sqrt(alpha), kAlphas), placeIn(std::sqrt(std::fabs(x) / kMostIndex), kIndices), thin,
           !thin && x < 0};
 }
 
