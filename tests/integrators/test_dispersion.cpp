@@ -8,6 +8,7 @@
 
 #include "renderer/transport/subpath.h"
 #include "tests/support/render_fixture.h"
+#include "tests/support/statistics/seed_means.h"
 
 namespace braid::test_dispersion {
 
@@ -88,39 +89,7 @@ SceneData glassBox(float dispersion) {
   return data;
 }
 
-constexpr int kSide = 24, kBlock = 8, kSeeds = 16;
-
-// Means of blocks and channels over seeds, with their standard errors.
-std::vector<Measured> blockMeans(const Scene& scene, const char* integrator, uint64_t spp, uint64_t firstSeed) {
-  Settings settings = settingsFor(kSide, kSide, spp);
-  settings.integrators = {integrator};
-  settings.photonRadius = 1;
-  std::vector<double> sum, squares;
-  for (uint64_t k = 0; k < kSeeds; ++k) {
-    settings.seed = firstSeed + k;
-    const RenderResult r = render(scene, settings);
-    size_t i = 0;
-    for (const PixelWindow& block : blocksOf(r, kBlock))
-      for (size_t c = 0; c < 3; ++c, ++i) {
-        sum.resize(std::max(sum.size(), i + 1));
-        squares.resize(sum.size());
-        const double mean = meanOver(r, c, block).value;
-        sum[i] += mean / kSeeds;
-        squares[i] += sqr(mean) / kSeeds;
-      }
-  }
-  std::vector<Measured> means;
-  for (size_t i = 0; i < sum.size(); ++i)
-    means.push_back({sum[i], std::sqrt(std::max(0.0, squares[i] - sqr(sum[i])) / (kSeeds - 1))});
-  return means;
-}
-
-double worst(const std::vector<Measured>& a, const std::vector<Measured>& b, double bias) {
-  double z = 0;
-  for (size_t i = 0; i < a.size(); ++i)
-    z = std::max(z, (std::fabs(a[i].value - b[i].value) - bias * b[i].value) / std::hypot(a[i].error, b[i].error));
-  return z;
-}
+const SeedMeans kMeans{24, 8, 16, {0, 1, 2}};
 
 }  // namespace
 
@@ -202,12 +171,12 @@ TEST_CASE("dispersion: in a white furnace dispersive glass cannot be seen") {
 TEST_CASE("dispersion: all integrators see the same colours through glass") {
   const Scene scene(glassBox(10)), plain(glassBox(0));
   CHECK_FALSE(plain.traits().has(kTraitDispersion));
-  const std::vector<Measured> pt = blockMeans(scene, "pt", 256, 1000);
-  CHECK(worst(blockMeans(plain, "pt", 256, 2000), pt, 0) > 7.5);
+  const std::vector<Measured> pt = blockMeans(kMeans, scene, "pt", 256, 1000);
+  CHECK(worst(blockMeans(kMeans, plain, "pt", 256, 2000), pt, 0) > 7.5);
   const std::tuple<const char*, uint64_t, double> others[] = {
       {"bdpt", 32, 0.0}, {"crn", 64, 0.0}, {"gdpt", 32, 0.0}, {"vcm", 32, 0.03}, {"sppm", 64, 0.03}};
   for (const auto& [name, spp, bias] : others) {
-    const double z = worst(blockMeans(scene, name, spp, 1), pt, bias);
+    const double z = worst(blockMeans(kMeans, scene, name, spp, 1), pt, bias);
     MESSAGE(std::string(name), ": largest difference from pt ", z, " standard errors");
     CHECK(z < 7.5);
   }

@@ -2,6 +2,7 @@
 // Motion blur: all integrators on one scene of which everything moves, and stills of it.
 #include <doctest/doctest.h>
 
+#include "tests/support/statistics/seed_means.h"
 #include "tests/support/moving_scenes.h"
 
 namespace braid::test_shutter_agreement {
@@ -66,34 +67,7 @@ SceneData stoppedBox() {
 
 constexpr int kSeeds = 16, kBlock = 6, kSide = 36;
 
-// As tests/scene/test_lens.cpp: means over blocks, with their standard errors over renders of different seeds.
-std::vector<Measured> blockMeans(const Scene& scene, const char* integrator, uint64_t spp, uint64_t firstSeed) {
-  Settings settings = settingsFor(kSide, kSide, spp);
-  settings.integrators = {integrator};
-  settings.photonRadius = 1;
-  std::vector<double> sum(36), squares(36);
-  for (uint64_t k = 0; k < kSeeds; ++k) {
-    settings.seed = firstSeed + k;
-    const RenderResult r = render(scene, settings);
-    const std::vector<PixelWindow> blocks = blocksOf(r, kBlock);
-    for (size_t b = 0; b < blocks.size(); ++b) {
-      const double mean = meanOver(r, 1, blocks[b]).value;
-      sum[b] += mean / kSeeds;
-      squares[b] += sqr(mean) / kSeeds;
-    }
-  }
-  std::vector<Measured> means;
-  for (size_t b = 0; b < sum.size(); ++b)
-    means.push_back({sum[b], std::sqrt(std::max(0.0, squares[b] - sqr(sum[b])) / (kSeeds - 1))});
-  return means;
-}
-
-double worst(const std::vector<Measured>& a, const std::vector<Measured>& b, double bias) {
-  double z = 0;
-  for (size_t i = 0; i < a.size(); ++i)
-    z = std::max(z, (std::fabs(a[i].value - b[i].value) - bias * b[i].value) / std::hypot(a[i].error, b[i].error));
-  return z;
-}
+const SeedMeans kMeans{kSide, kBlock, kSeeds};
 
 // Where the moving scene is at a time.
 SceneData stillAt(float time) {
@@ -131,12 +105,12 @@ SceneData stillAt(float time) {
 TEST_CASE("Shutter: all integrators see the same box, of which everything moves") {
   const Scene scene(movingBox()), stopped(stoppedBox());
   CHECK(scene.moves());
-  const std::vector<Measured> pt = blockMeans(scene, "pt", 32, 1000);
-  CHECK(worst(blockMeans(stopped, "pt", 32, 2000), pt, 0) > 20);
+  const std::vector<Measured> pt = blockMeans(kMeans, scene, "pt", 32, 1000);
+  CHECK(worst(blockMeans(kMeans, stopped, "pt", 32, 2000), pt, 0) > 20);
   const std::tuple<const char*, uint64_t, double> others[] = {
       {"bdpt", 16, 0.0}, {"crn", 32, 0.0}, {"gdpt", 16, 0.0}, {"vcm", 16, 0.02}, {"sppm", 32, 0.02}};
   for (const auto& [name, spp, bias] : others) {
-    const double z = worst(blockMeans(scene, name, spp, 1), pt, bias);
+    const double z = worst(blockMeans(kMeans, scene, name, spp, 1), pt, bias);
     MESSAGE(std::string(name), ": largest difference from pt ", z, " standard errors");
     CHECK(z < 7);
   }
@@ -144,7 +118,7 @@ TEST_CASE("Shutter: all integrators see the same box, of which everything moves"
 
 TEST_CASE("Shutter: the mean of stills at even times is the picture of the open shutter") {
   const Scene scene(movingBox());
-  const std::vector<Measured> blurred = blockMeans(scene, "pt", 32, 5000);
+  const std::vector<Measured> blurred = blockMeans(kMeans, scene, "pt", 32, 5000);
   // A time at random within each of 32 parts, anew for each of the seeds.
   constexpr int kStills = 32;
   std::vector<double> sum(36), squares(36);

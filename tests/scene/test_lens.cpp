@@ -5,6 +5,7 @@
 #include "renderer/film/files/exr.h"
 #include "tests/support/command_line.h"
 #include "tests/support/render_fixture.h"
+#include "tests/support/statistics/seed_means.h"
 
 namespace braid::test_lens {
 
@@ -45,38 +46,7 @@ SceneData blurredBox(float lensRadius) {
   return data;
 }
 
-constexpr int kSeeds = 16, kBlock = 6, kSide = 36, kBlocks = sqr(kSide / kBlock);
-
-// Means of green over blocks of pixels, with their standard errors over renders of different seeds: right also where
-// pixels share random numbers, photons or a reconstruction.
-std::vector<Measured> blockMeans(const Scene& scene, const char* integrator, uint64_t spp, uint64_t firstSeed) {
-  Settings settings = settingsFor(kSide, kSide, spp);
-  settings.integrators = {integrator};
-  settings.photonRadius = 1;
-  std::vector<double> sum(kBlocks), squares(kBlocks);
-  for (uint64_t k = 0; k < kSeeds; ++k) {
-    settings.seed = firstSeed + k;
-    const RenderResult r = render(scene, settings);
-    const std::vector<PixelWindow> blocks = blocksOf(r, kBlock);
-    for (size_t b = 0; b < blocks.size(); ++b) {
-      const double mean = meanOver(r, 1, blocks[b]).value;
-      sum[b] += mean / kSeeds;
-      squares[b] += sqr(mean) / kSeeds;
-    }
-  }
-  std::vector<Measured> means;
-  for (size_t b = 0; b < kBlocks; ++b)
-    means.push_back({sum[b], std::sqrt(std::max(0.0, squares[b] - sqr(sum[b])) / (kSeeds - 1))});
-  return means;
-}
-
-// The largest difference in standard errors, `bias` of the value forgiven.
-double worst(const std::vector<Measured>& a, const std::vector<Measured>& b, double bias) {
-  double z = 0;
-  for (size_t i = 0; i < a.size(); ++i)
-    z = std::max(z, (std::fabs(a[i].value - b[i].value) - bias * b[i].value) / std::hypot(a[i].error, b[i].error));
-  return z;
-}
+const SeedMeans kMeans{36, 6, 16};
 
 }  // namespace
 
@@ -187,13 +157,13 @@ TEST_CASE("Lens: the circle of confusion of a far and of a near point is that of
 // alarm in 1,000 choices of seeds. Photons and merging blur: 2 % are forgiven there.
 TEST_CASE("Lens: all integrators see the same blurred box") {
   const Scene scene(blurredBox(0.25f)), sharp(blurredBox(0));
-  const std::vector<Measured> pt = blockMeans(scene, "pt", 64, 1000);
+  const std::vector<Measured> pt = blockMeans(kMeans, scene, "pt", 64, 1000);
   // The test would see a pinhole: the largest difference.
-  CHECK(worst(blockMeans(sharp, "pt", 64, 2000), pt, 0) > 20);
+  CHECK(worst(blockMeans(kMeans, sharp, "pt", 64, 2000), pt, 0) > 20);
   const std::tuple<const char*, uint64_t, double> others[] = {
       {"bdpt", 16, 0.0}, {"crn", 64, 0.0}, {"gdpt", 32, 0.0}, {"vcm", 16, 0.02}, {"sppm", 32, 0.02}};
   for (const auto& [name, spp, bias] : others) {
-    const double z = worst(blockMeans(scene, name, spp, 1), pt, bias);
+    const double z = worst(blockMeans(kMeans, scene, name, spp, 1), pt, bias);
     MESSAGE(std::string(name), ": largest difference from pt ", z, " standard errors");
     CHECK(z < 7);
   }
