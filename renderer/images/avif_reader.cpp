@@ -68,8 +68,17 @@ class AvifReader : public ImageReader {
   const ImageHeader& header() const override { return header_; }
   bool readRows(int, int, float*) override { return fail("rows of it cannot be read"); }
 
+  bool decode() override {
+    const uint32_t width = decoder_->image->width, height = decoder_->image->height, depth = decoder_->image->depth;
+    if (const avifResult result = avifDecoderNextImage(decoder_.get()); result != AVIF_RESULT_OK) return fail(result);
+    const avifImage& image = *decoder_->image;
+    // What the payload holds may differ from what the container said.
+    if (image.width != width || image.height != height || (image.depth > 8) != (depth > 8))
+      return fail("its pixels are others than its header says");
+    return true;
+  }
+
   bool readImage(int channels, SampleType type, void* samples) override {
-    if (!decode()) return false;
     avifRGBImage rgb;
     avifRGBImageSetDefaults(&rgb, decoder_->image);
     rgb.format = channels == 4 ? AVIF_RGB_FORMAT_RGBA : AVIF_RGB_FORMAT_RGB;
@@ -89,16 +98,6 @@ class AvifReader : public ImageReader {
     return false;
   }
   bool fail(avifResult result) { return fail(avifResultToString(result)); }
-
-  bool decode() {
-    const uint32_t width = decoder_->image->width, height = decoder_->image->height, depth = decoder_->image->depth;
-    if (const avifResult result = avifDecoderNextImage(decoder_.get()); result != AVIF_RESULT_OK) return fail(result);
-    const avifImage& image = *decoder_->image;
-    // What the payload holds may differ from what the container said, by which memory was taken.
-    if (image.width != width || image.height != height || (image.depth > 8) != (depth > 8))
-      return fail("its pixels are others than its header says");
-    return true;
-  }
 
   static void assign(uint8_t& to, uint8_t from) { to = from; }
   static void assign(float& to, uint16_t from) { to = static_cast<float>(from) / 65535; }

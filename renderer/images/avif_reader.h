@@ -14,7 +14,7 @@ bool isAvif(const uint8_t* data, size_t bytes);
 
 // An image in memory, which must outlive the reader: RGB or RGBA with unassociated alpha, 8 bits or LargerInteger,
 // turned and mirrored as the file says. Of a sequence the first picture. Null: `error` says why. Nothing is allocated
-// for pixels before readImage().
+// for pixels before decode(), which readImage() asks for.
 std::unique_ptr<ImageReader> openAvif(const uint8_t* data, size_t bytes, std::string& error);
 
 }  // namespace braid

@@ -47,6 +47,9 @@ class ImageReader {
   virtual const ImageHeader& header() const = 0;
   // Rows [begin, end) of that part, counted from its first, all channels interleaved. Of tiles, whole rows of them.
   virtual bool readRows(int begin, int end, float* samples) = 0;
+  // Whether the pixels of the first part are there, of formats that tell without room for them: readPixels() takes room
+  // only then.
+  virtual bool decode() { return true; }
   // The first channels of the whole first part, interleaved, as bytes or as floats.
   virtual bool readImage(int channels, SampleType type, void* samples) = 0;
   // Why something was false; maybe of several lines.

@@ -154,7 +154,7 @@ float Environment::sample(const Vec3& normal, Vec2 u, Vec3& direction, Spectrum&
     const size_t y = findInterval(marginal_.data(), static_cast<size_t>(height_), u.y, at.y);
     const float* row = &conditional_[y * (static_cast<size_t>(width_) + 1)];
     const size_t x = findInterval(row, static_cast<size_t>(width_), u.x, at.x);
-    at += Vec2(static_cast<float>(x), static_cast<float>(y));
+    at = Vec2(placeIn(x, at.x), placeIn(y, at.y));
   } else {
     ratio = blocks_.sample(texels(), toLocal(normal), u, at);
     if (!(ratio > 0)) return 0;

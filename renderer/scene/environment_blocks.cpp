@@ -114,8 +114,9 @@ void EnvironmentBlocks::fillTable(const Vec3& normal, const std::vector<Vec3>& p
 }
 
 EnvironmentBlocks::Mixture EnvironmentBlocks::mixtureOf(const Vec3& n) const {
-  const float row = std::acos(std::clamp(n.y, -1.0f, 1.0f)) * kInvPi * (kNormalRows - 1);
-  const float column = (std::atan2(n.z, n.x) * 0.5f * kInvPi + 0.5f) * kNormalColumns;
+  // In this order, for max() makes 0 of what is no number.
+  const float row = std::max(0.0f, std::acos(std::clamp(n.y, -1.0f, 1.0f)) * kInvPi * (kNormalRows - 1));
+  const float column = std::max(0.0f, (std::atan2(n.z, n.x) * 0.5f * kInvPi + 0.5f) * kNormalColumns);
   const int row0 = std::min(static_cast<int>(row), kNormalRows - 2), column0 = static_cast<int>(column);
   const float fy = row - static_cast<float>(row0), fx = column - static_cast<float>(column0);
   Mixture m;
@@ -145,7 +146,7 @@ float EnvironmentBlocks::sample(const TexelDistribution& of, const Vec3& normal,
   // Differences first: of a small share of the row little else would be left.
   u.x *= cdf[end] - cdf[begin];
   const int x = begin + findStep([&](int k) { return cdf[begin + k] - cdf[begin]; }, end - begin, u.x);
-  position = Vec2(static_cast<float>(x) + u.x, static_cast<float>(y) + u.y);
+  position = Vec2(placeIn(static_cast<size_t>(x), u.x), placeIn(static_cast<size_t>(y), u.y));
   return (at(m, leftOf(column + 1, row)) - at(m, leftOf(column, row))) / share_[block];
 }
 

@@ -4,6 +4,7 @@
 // Between the normals of the grid probabilities are interpolated, so that densities have no steps.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <vector>
@@ -19,6 +20,11 @@ struct TexelDistribution {
   const std::vector<float>& marginal;
   int width = 0, height = 0;
 };
+
+// i + fraction, and below i + 1 where floats are too coarse for the sum: a place stays in its texel.
+inline float placeIn(size_t i, float fraction) {
+  return std::min(static_cast<float>(i) + fraction, static_cast<float>(i + 1) * kOneMinusEpsilon);
+}
 
 class EnvironmentBlocks {
  public:

@@ -148,6 +148,7 @@ TEST_CASE("Headers that lie are refused before anything is allocated for them") 
     folder.write("lie.state", withHeader(good, from, to));
     return refusal(folder.path / "lie.state");
   };
+  CHECK(contains(refusalWith("\nplane ", "\nplacement\nplane "), "placement of samples after an estimate"));
   CHECK(refusalWith("sppm", "sppm").empty());  // the helper itself makes valid files
   CHECK(contains(refusalWith("pixels 4 2 0 0 4 2", "pixels 65536 4096 0 0 65536 4096"), "size of the image"));
   CHECK(contains(refusalWith("pixels 4 2 0 0 4 2", "pixels 65536 65536 0 0 65536 65536"), "268 million"));

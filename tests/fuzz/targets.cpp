@@ -160,7 +160,7 @@ void image(Input input) {
 void state(Input input) {
   const auto header = static_cast<size_t>(std::find(input.begin(), input.end(), 0) - input.begin());
   const Input planes = input.subspan(std::min(header + 1, input.size()));
-  const std::string first = fmt::format("braid-state 1 {} {}\n", header, planes.size());
+  const std::string first = fmt::format("braid-state {} {} {}\n", kStateFormat, header, planes.size());
   std::vector<uint8_t> file;
   append(file, first.data(), first.size());
   append(file, input.data(), header);

@@ -199,6 +199,24 @@ TEST_CASE("An environment lies as in three.js and in Blender: its centre in +X, 
   CHECK(only(5, 1).radiance(glm::normalize(Vec3(0.3f, 0.4f, -1))).x == 0);
 }
 
+TEST_CASE(
+    "A place in a texel stays there, however coarse floats are, and images of one bright row are sampled safely") {
+  for (const size_t i : {size_t(0), size_t(1), size_t(22), size_t(899), size_t(4095), size_t(8191), size_t(65535)}) {
+    CHECK(static_cast<size_t>(placeIn(i, 0)) == i);
+    CHECK(static_cast<size_t>(placeIn(i, 0.5f)) == i);
+    CHECK(static_cast<size_t>(placeIn(i, kOneMinusEpsilon)) == i);
+  }
+  const Environment environment(environmentImage(8, 900, [](int, int y) { return Spectrum(y == 899 ? 1.0f : 0.0f); }));
+  Rng rng(14);
+  for (const Vec3& normal : {Vec3(0), Vec3(0, -1, 0), Vec3(std::nanf(""), 0, 1)})
+    for (int i = 0; i < 50'000; ++i) {
+      Vec3 w;
+      Spectrum radiance;
+      const float pdf = environment.sample(normal, rng.next2(), w, radiance);
+      REQUIRE((pdf >= 0 && std::isfinite(pdf)));
+    }
+}
+
 TEST_CASE("A sun of one texel takes almost all samples and its neighbourhood keeps the rest") {
   const Environment environment(
       environmentImage(256, 128, [](int x, int y) { return Spectrum(x == 90 && y == 40 ? 1e9f : 1.0f); }));

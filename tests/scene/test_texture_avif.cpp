@@ -10,6 +10,7 @@
 #include "renderer/core/error.h"
 #include "renderer/scene/data/textures/texture.h"
 #include "tests/support/avif_writer.h"
+#include "tests/support/gltf_fixture.h"
 
 namespace braid::test_texture_avif {
 
@@ -68,6 +69,13 @@ TEST_CASE("texture: AVIF without loss has the pixels of the picture, with and wi
   const auto veiled = decoded(avifOf(rgba, {.width = 7, .height = 5, .alpha = true}));
   CHECK(veiled->channels == 4);
   CHECK(veiled->bytes == rgba);
+}
+
+TEST_CASE("texture: an AVIF file by its path is what it is in memory") {
+  const test::Folder folder;
+  const Bytes bytes = avifOf(pattern(7 * 5), {.width = 7, .height = 5, .alpha = true});
+  const std::string path = folder.write("picture.avif", std::string(bytes.begin(), bytes.end()));
+  CHECK(readImageFile(path)->bytes == decoded(bytes)->bytes);
 }
 
 TEST_CASE("texture: AVIF whose colours are multiplied by alpha gives them undivided") {

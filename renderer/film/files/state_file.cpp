@@ -20,7 +20,6 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "state files hold the planes as they lie in memory");
 
 constexpr char kMagic[] = "braid-state";
-constexpr int kFormat = 3;
 constexpr uint64_t kMaxHeader = 16 << 20;
 constexpr size_t kFirstLine = 64;      // at most
 constexpr size_t kChecksumBytes = 17;  // 16 digits and a newline
@@ -85,9 +84,9 @@ std::vector<PlaneEntry> readHeader(Reader& in, const std::string& path, FilmStat
   const int found = std::sscanf(line.c_str(), "braid-state %d %llu %llu%n", &format, &headerBytes, &planeBytes, &used);
   if (line.compare(0, sizeof kMagic - 1, kMagic) != 0)
     in.fail("is no state of braid: give a file that --checkpoint wrote");
-  if (found >= 1 && format != kFormat)
+  if (found >= 1 && format != kStateFormat)
     in.fail(fmt::format("has state format {}, but this braid reads format {}: use the braid that wrote it", format,
-                        kFormat));
+                        kStateFormat));
   if (found != 3 || static_cast<size_t>(used) != line.size() || headerBytes > kMaxHeader || planeBytes > in.size())
     in.fail("the first line is damaged or the file cut short: use another copy");
   const uint64_t expected = in.position() + headerBytes + planeBytes + kChecksumBytes;
@@ -112,7 +111,13 @@ void readPlane(Reader& in, const FilmState& state, const PlaneEntry& entry, Plan
 }
 
 // Whether numbers of samples, hits and weights are such as a render makes.
-bool isPossible(SamplePlacement& placement) {
+bool isPossible(FilmState& state) {
+  SamplePlacement& placement = *state.placement;
+  const auto mean = [&](const Plane<double>& plane) {
+    double sum = 0;
+    for (size_t t = 0; t < placement.tiles(); ++t) sum += placement.pixels(t) * plane[t];
+    return sum / (static_cast<double>(placement.width) * placement.height);
+  };
   RawSums list;
   placement.listSums(list);
   const size_t whole = list.size();
@@ -120,6 +125,13 @@ bool isPossible(SamplePlacement& placement) {
   for (size_t p = 0; p < list.size(); ++p)
     for (const double v : list[p].plane->data)
       if (!(v >= 0 && v <= static_cast<double>(kMaxPass)) || (p < whole && v != std::floor(v))) return false;
+  // A pass gives a pixel one sample on average, but for rounding.
+  for (const Plane<double>& weight : placement.weight)
+    if (mean(weight) > 2) return false;
+  for (int k = 0; k < 4; ++k)
+    if (mean(placement.count[static_cast<size_t>(k)]) >
+        2 * static_cast<double>(state.estimates[0].sums.passesInBucket(k) + 1))
+      return false;
   return true;
 }
 
@@ -138,7 +150,7 @@ std::unique_ptr<OutputFile> beginStateFile(const std::string& path, const FilmSt
     hash.add(data, bytes);
     if (file->write(data, bytes) != bytes) file->fail("");
   };
-  const std::string first = fmt::format("{} {} {} {}\n", kMagic, kFormat, header.size(), planeBytes);
+  const std::string first = fmt::format("{} {} {} {}\n", kMagic, kStateFormat, header.size(), planeBytes);
   write(first.data(), first.size());
   write(header.data(), header.size());
   for (const PlaneEntry& p : planes)
@@ -173,7 +185,7 @@ FilmState readStateFile(const std::string& path) {
   in.read(stored, sizeof stored);
   if (computed + '\n' != std::string(stored, sizeof stored))
     in.fail("is damaged: its checksum is not that of its content: use another copy");
-  if (state.placement && !isPossible(*state.placement))
+  if (state.placement && !isPossible(state))
     in.fail("holds impossible numbers of samples: use another copy, or render again");
   return state;
 }

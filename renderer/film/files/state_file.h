@@ -17,6 +17,8 @@
 
 namespace braid {
 
+inline constexpr int kStateFormat = 3;
+
 // Writes all bytes to a temporary file; finish() of the result (which waits for the disk and may be called by another
 // thread) puts it in place of `path`. Throws Error(OutputFailed).
 std::unique_ptr<OutputFile> beginStateFile(const std::string& path, const FilmState& state);

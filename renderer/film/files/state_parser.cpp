@@ -169,7 +169,11 @@ constexpr std::array kWords = {
     Word{"checkpoint", parseCheckpoint},
     Word{"features", parseFeatures},
     Word{"coverage", parseCoverage},
-    Word{"placement", [](Line&, Parsed& p) { p.state.placement.emplace(); }},
+    Word{"placement",
+         [](Line& line, Parsed& p) {
+           if (p.state.placement || !p.state.estimates.empty()) line.fail("placement of samples after an estimate");
+           p.state.placement.emplace();
+         }},
     Word{"plane", parsePlane},
 };
 
@@ -195,7 +199,8 @@ void parseStateHeader(const std::string& file, const std::string& text, FilmStat
   }
   const Line last(file, number, "");
   if (state.placement) {
-    if (state.estimates.size() != 1 || state.buckets != 4) last.fail("placement of samples without its four buckets");
+    if (state.estimates.size() != 1 || state.buckets != 4 || state.coverage || state.estimates[0].sums.keepsBias())
+      last.fail("placement of samples with other parts than it has");
     state.placement->width = state.window.width();
     state.placement->height = state.window.height();
   }

@@ -70,6 +70,16 @@ TEST_CASE("gltf: pointers move factors of materials, of extensions too") {
   CHECK(rest.roughness == 1);
 }
 
+TEST_CASE("gltf: values of another shape than what their pointer leads to are told, and move nothing") {
+  GltfFile file = redQuad();
+  animate(file, "/materials/0/emissiveFactor", {1, 1, 1, 1, 0, 0, 0, 0}, "VEC4");
+  animate(file, "/materials/0/pbrMetallicRoughness/roughnessFactor", {0, 1}, "SCALAR");
+  const SceneData half = file.load(at(1));
+  CHECK(half.materials[0].emission == Spectrum(0));
+  CHECK(half.materials[0].roughness == 0.5f);
+  CHECK(hasWarning(half, "/animations/0/channels/0"));
+}
+
 TEST_CASE("gltf: pointers move the transforms of textures") {
   GltfFile file = redQuad();
   const std::string transform = "/materials/0/pbrMetallicRoughness/baseColorTexture/extensions/KHR_texture_transform/";

@@ -8,6 +8,7 @@ The function gets the image, an array of shape (height, width, 3), and a dict wi
 the denoised image, as the denoisers of `braid.combine()` do. Only numpy is needed.
 """
 import importlib.util
+import pathlib
 import sys
 
 import numpy as np
@@ -32,8 +33,11 @@ def write_pfm(path: str, image: np.ndarray) -> None:
 
 def main(function: str, color: str, albedo: str, normal: str, out: str) -> None:
     path, name = function.rsplit(":", 1)
+    if not path.endswith(".py"):
+        raise ValueError(f"{path}: is no Python file; name one that ends in .py")
+    sys.path.insert(0, str(pathlib.Path(path).resolve().parent))
     spec = importlib.util.spec_from_file_location("denoiser", path)
-    module = importlib.util.module_from_spec(spec)
+    sys.modules["denoiser"] = module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     image = read_pfm(color)
     result = np.asarray(getattr(module, name)(image, {"albedo": read_pfm(albedo), "normal": read_pfm(normal)}))

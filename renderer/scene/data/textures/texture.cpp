@@ -176,6 +176,10 @@ std::shared_ptr<Image> readPixels(ImageReader& reader, const std::string& name, 
   image->channels = keptChannels(header);
   const size_t values =
       static_cast<size_t>(header.width) * static_cast<size_t>(header.height) * static_cast<size_t>(image->channels);
+  const auto broken = [&] {
+    return Error(ExitCode::BadInput, "is a broken image (" + oneLine(reader.takeError()) + "); save it again");
+  };
+  if (!reader.decode()) throw broken();
   const bool isByte = header.type == SampleType::Byte;
   void* out = nullptr;
   if (isByte) {
@@ -186,8 +190,7 @@ std::shared_ptr<Image> readPixels(ImageReader& reader, const std::string& name, 
     image->integerFloats = !isFloatingPoint(header.type);
     out = image->floats.data();
   }
-  if (!reader.readImage(image->channels, isByte ? SampleType::Byte : SampleType::Float, out))
-    throw Error(ExitCode::BadInput, "is a broken image (" + oneLine(reader.takeError()) + "); save it again");
+  if (!reader.readImage(image->channels, isByte ? SampleType::Byte : SampleType::Float, out)) throw broken();
   limitFloats(*image);
   return image;
 }
@@ -286,6 +289,7 @@ auto ownDecoder(const std::string& path) -> decltype(&decodeWebp) {
   const auto* bytes = reinterpret_cast<const uint8_t*>(first.data());
   if (isWebp(bytes, first.size())) return decodeWebp;
   if (isKtx2(bytes, first.size())) return decodeKtx2;
+  if (std::equal(first.begin() + 4, first.begin() + 8, "ftyp")) return decodeImage;
   return nullptr;
 }
 

@@ -61,7 +61,9 @@ Bytes slice(Document& document, int buffer, uint64_t offset, uint64_t length, co
   return offset < data.size() ? data.subspan(offset) : Bytes();
 }
 
-bool layoutValid(const Packed& view, uint64_t viewLength, Report& report, const std::string& place) {
+// `packedBytes`: those that are there.
+bool layoutValid(const Packed& view, uint64_t packedBytes, uint64_t viewLength, Report& report,
+                 const std::string& place) {
   const char* const without = "what reads it is left out";
   const bool attributes = view.mode == Mode::Attributes;
   const bool strideFits =
@@ -74,7 +76,7 @@ bool layoutValid(const Packed& view, uint64_t viewLength, Report& report, const 
     return false;
   }
   // The codecs pack at best 1024 to 1; more is a declared size that the data cannot hold.
-  if (view.count > viewLength / view.stride || view.count * view.stride > view.length * 1024 + 4096) {
+  if (view.count > viewLength / view.stride || view.count * view.stride > packedBytes * 1024 + 4096) {
     report.problem(place + "/count",
                    "is " + std::to_string(view.count) + ", more than the view can hold; compress the file again",
                    without);
@@ -141,6 +143,9 @@ struct Job {
 
 void resolveViews(Document& document) {
   std::vector<Job> jobs;
+  // Views that overlap could have the same few bytes unpacked any number of times.
+  uint64_t present = 0, claimed = 0;
+  for (const tinygltf::Buffer& buffer : document.model.buffers) present += buffer.data.size();
   for (size_t i = 0; i < document.views.size(); ++i) {
     const tinygltf::BufferView& json = document.model.bufferViews[i];
     View& view = document.views[i];
@@ -155,8 +160,14 @@ void resolveViews(Document& document) {
     const Packed packed = readPacked(extension);
     const std::string at = place + "/extensions/" + name;
     const Bytes source = slice(document, packed.buffer, packed.offset, packed.length, at);
-    if (!source.empty() && layoutValid(packed, json.byteLength, document.report, at))
-      jobs.push_back({&view, packed, source, at});
+    if (source.empty() || !layoutValid(packed, source.size(), json.byteLength, document.report, at)) continue;
+    claimed += source.size();
+    if (claimed > 2 * present) {
+      document.report.problem(at, "shares its bytes with many other views; compress the file again",
+                              "what reads it is left out");
+      continue;
+    }
+    jobs.push_back({&view, packed, source, at});
   }
   parallelFor(jobs.size(), [&](size_t i) {
     Job& job = jobs[i];

@@ -57,7 +57,8 @@ class Animator {
     // Broken accessors have no values.
     const std::vector<float>& times = floats(sampler.input);
     const size_t perKey = (sampler.interpolation == "CUBICSPLINE" ? 3 : 1) * width;
-    if (times.empty() || floats(sampler.output).size() < times.size() * perKey || !isOrdered(place, times)) return {};
+    if (times.empty() || floats(sampler.output).size() < times.size() * perKey || !isOrdered(place, sampler.input))
+      return {};
     std::vector<double> value = evaluate(sampler, channel, findKeys(times, time_), width);
     if (std::all_of(value.begin(), value.end(), [](double v) { return std::isfinite(v); })) return value;
     document_.report.warn(place, "an animation yields values that are not finite; its target stays at rest");
@@ -65,18 +66,27 @@ class Animator {
   }
 
  private:
-  // Two keys at one time are a jump, which many programs write. Times that go back say nothing.
-  bool isOrdered(const std::string& place, const std::vector<float>& times) {
-    bool jumps = false;
+  enum class Order { Increasing, Jumping, Broken };
+
+  static Order orderOf(const std::vector<float>& times) {
+    Order order = Order::Increasing;
     for (size_t i = 0; i < times.size(); ++i) {
-      if (!std::isfinite(times[i]) || (i > 0 && times[i] < times[i - 1])) {
-        document_.report.warn(place, "the key times of an animation do not increase; it is ignored");
-        return false;
-      }
-      jumps = jumps || (i > 0 && times[i] == times[i - 1]);
+      if (!std::isfinite(times[i]) || (i > 0 && times[i] < times[i - 1])) return Order::Broken;
+      if (i > 0 && times[i] == times[i - 1]) order = Order::Jumping;
     }
-    if (jumps) document_.report.warn(place, "an animation has two keys at one time; the value jumps there");
-    return true;
+    return order;
+  }
+
+  // Two keys at one time are a jump, which many programs write. Times that go back say nothing.
+  bool isOrdered(const std::string& place, int accessor) {
+    const auto found = order_.find(accessor);
+    const Order order =
+        found != order_.end() ? found->second : order_.emplace(accessor, orderOf(floats(accessor))).first->second;
+    if (order == Order::Broken)
+      document_.report.warn(place, "the key times of an animation do not increase; it is ignored");
+    if (order == Order::Jumping)
+      document_.report.warn(place, "an animation has two keys at one time; the value jumps there");
+    return order != Order::Broken;
   }
 
   std::vector<double> evaluate(const tinygltf::AnimationSampler& sampler, const tinygltf::AnimationChannel& channel,
@@ -130,7 +140,18 @@ class Animator {
   Document& document_;
   float time_;
   std::unordered_map<int, std::vector<float>> cache_;
+  std::unordered_map<int, Order> order_;  // of key times
 };
+
+// Whether the values of a channel come in so many numbers each; weights are written one by one.
+bool hasShape(const Document& document, const tinygltf::Animation& animation, const tinygltf::AnimationChannel& channel,
+              size_t width) {
+  if (channel.sampler < 0) return true;
+  const int output = animation.samplers[static_cast<size_t>(channel.sampler)].output;
+  if (output < 0 || document.accessor(output).count == 0) return true;
+  const size_t components = componentsOf(document.accessor(output));
+  return components == 1 || components == width;
+}
 
 }  // namespace
 
@@ -155,12 +176,21 @@ void animate(Document& document, int clip, float time) {
   }
 }
 
-std::optional<std::vector<double>> animatedValue(Document& document, const AnimatedProperty& property, float time) {
-  const tinygltf::Animation& animation = document.model.animations[static_cast<size_t>(property.clip)];
-  const std::string place =
-      "/animations/" + std::to_string(property.clip) + "/channels/" + std::to_string(property.channel);
-  return Animator(document, time)
-      .valueOf(animation, animation.channels[static_cast<size_t>(property.channel)], property.width, place);
+std::vector<std::optional<std::vector<double>>> animatedValues(Document& document, int clip, float time) {
+  Animator animator(document, time);
+  std::vector<std::optional<std::vector<double>>> values;
+  for (const AnimatedProperty& property : document.properties) {
+    values.emplace_back();
+    if (property.clip != clip) continue;
+    const tinygltf::Animation& animation = document.model.animations[static_cast<size_t>(clip)];
+    const tinygltf::AnimationChannel& channel = animation.channels[static_cast<size_t>(property.channel)];
+    const std::string place = "/animations/" + std::to_string(clip) + "/channels/" + std::to_string(property.channel);
+    if (hasShape(document, animation, channel, property.width))
+      values.back() = animator.valueOf(animation, channel, property.width, place);
+    else
+      document.report.warn(place, "its values have another shape than what its pointer leads to; it stays at rest");
+  }
+  return values;
 }
 
 double clipSeconds(const Document& document, const tinygltf::Animation& animation) {

@@ -154,9 +154,10 @@ void animateProperties(Document& document) {
   Json root = document.animatable ? *document.animatable : Json::object();
   std::set<std::pair<std::string, size_t>> changed;
   bool any = false;
-  for (const AnimatedProperty& property : document.properties) {
-    if (property.clip != clip) continue;
-    const std::optional<std::vector<double>> value = animatedValue(document, property, time);
+  const std::vector<std::optional<std::vector<double>>> values = animatedValues(document, clip, time);
+  for (size_t i = 0; i < values.size(); ++i) {
+    const AnimatedProperty& property = document.properties[i];
+    const std::optional<std::vector<double>>& value = values[i];
     if (!value) continue;
     any = true;
     if (property.visibleNode >= 0) {

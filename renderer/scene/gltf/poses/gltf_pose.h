@@ -33,8 +33,8 @@ glm::dquat quaternion(const double* xyzw);
 // gltf_animation.cpp: applies all channels of a clip at `time`.
 void animate(Document& document, int clip, float time);
 
-// gltf_animation.cpp: the value of a property at `time`; none: its channel says nothing.
-std::optional<std::vector<double>> animatedValue(Document& document, const AnimatedProperty& property, float time);
+// gltf_animation.cpp: the values of the document's properties at `time` of a clip; none: it does not move that one.
+std::vector<std::optional<std::vector<double>>> animatedValues(Document& document, int clip, float time);
 
 // gltf_pointers.cpp, KHR_animation_pointer. Finds what the pointers of a file lead to: places of nodes become ordinary
 // channels, the rest properties of the document.
