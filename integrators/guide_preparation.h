@@ -9,7 +9,7 @@
 #include <string>
 
 #include "integrators/guiding/guide.h"
-#include "integrators/preparation_ref.h"
+#include "renderer/session/preparation_ref.h"
 
 namespace braid {
 

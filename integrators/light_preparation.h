@@ -2,7 +2,7 @@
 // What integrators with light subpaths prepare once per render.
 #pragma once
 
-#include "integrators/preparation_ref.h"
+#include "renderer/session/preparation_ref.h"
 #include "renderer/transport/light_emission.h"
 
 namespace braid {

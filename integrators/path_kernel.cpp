@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "integrators/camera_paths.h"
-#include "integrators/path_time.h"
+#include "renderer/session/path_time.h"
 #include "renderer/core/error.h"
 #include "renderer/transport/dispersion.h"
 #include "renderer/transport/mis.h"

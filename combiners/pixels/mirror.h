@@ -3,7 +3,7 @@
 // them: every block has the same number of pixels, and mirrored ones count twice (combiners/README.md, Windows).
 #pragma once
 
-#include "renderer/film/box_sum.h"
+#include "renderer/core/box_sum.h"
 
 namespace braid {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "renderer/core/parallel.h"
-#include "renderer/film/box_sum.h"
+#include "renderer/core/box_sum.h"
 
 namespace braid {
 

@@ -8,7 +8,7 @@
 #include "combiners/pixels/finite_float.h"
 #include "combiners/shrinkage/shrinkage.h"
 #include "renderer/core/parallel.h"
-#include "renderer/film/box_sum.h"
+#include "renderer/core/box_sum.h"
 
 namespace braid {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "integrators/camera_paths.h"
-#include "integrators/path_time.h"
+#include "renderer/session/path_time.h"
 #include "integrators/tiles.h"
 
 namespace braid {

@@ -9,7 +9,7 @@
 
 #include "integrators/bidirectional/bidirectional.h"
 #include "integrators/light_preparation.h"
-#include "integrators/path_time.h"
+#include "renderer/session/path_time.h"
 #include "integrators/registry.h"
 #include "integrators/tiles.h"
 #include "renderer/core/parallel.h"

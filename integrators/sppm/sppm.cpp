@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 
 #include "integrators/light_preparation.h"
-#include "integrators/path_time.h"
+#include "renderer/session/path_time.h"
 #include "integrators/registry.h"
 #include "integrators/sppm/sppm_eye.h"
 #include "integrators/sppm/sppm_gather.h"

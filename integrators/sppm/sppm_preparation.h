@@ -5,7 +5,7 @@
 
 #include <optional>
 
-#include "integrators/preparation_ref.h"
+#include "renderer/session/preparation_ref.h"
 #include "integrators/sppm/sppm_photons.h"
 
 namespace braid {

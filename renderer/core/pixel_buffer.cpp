@@ -10,8 +10,6 @@
 #include <new>
 #include <vector>
 
-#include "renderer/core/pixel_memory.h"
-
 namespace braid {
 
 namespace {

@@ -108,4 +108,7 @@ class PixelBuffer {
   size_t size_ = 0;
 };
 
+// Bytes of the mapped buffers that are in use now, for those who count memory. Takes no lock: allocators may ask.
+size_t mappedPixelBytes() noexcept;
+
 }  // namespace braid

@@ -4,7 +4,7 @@
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 #include "renderer/film/film.h"
-#include "renderer/film/moments.h"
+#include "renderer/core/moments.h"
 
 namespace braid {
 

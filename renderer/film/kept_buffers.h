@@ -2,7 +2,10 @@
 // What a film keeps besides means, halves and variances, and what methods and outputs read of it.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <iterator>
+#include <utility>
 #include <vector>
 
 namespace braid {
@@ -18,7 +21,17 @@ struct KeptBuffers {
 
   static KeptBuffers everything() { return {true, true, true, true, true, {}}; }
   // What either of both holds.
-  KeptBuffers& operator|=(const KeptBuffers& other);
+  KeptBuffers& operator|=(const KeptBuffers& other) {
+    features |= other.features;
+    featureNoise |= other.featureNoise;
+    quarters |= other.quarters;
+    history |= other.history;
+    directIndirect |= other.directIndirect;
+    std::vector<uint64_t> both;
+    std::set_union(stops.begin(), stops.end(), other.stops.begin(), other.stops.end(), std::back_inserter(both));
+    stops = std::move(both);
+    return *this;
+  }
   bool operator==(const KeptBuffers&) const = default;
 };
 

@@ -5,8 +5,8 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
-#include "renderer/film/box_sum.h"
-#include "renderer/film/moments.h"
+#include "renderer/core/box_sum.h"
+#include "renderer/core/moments.h"
 
 namespace braid {
 

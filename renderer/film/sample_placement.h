@@ -9,7 +9,7 @@
 
 #include "renderer/core/parallel.h"
 #include "renderer/core/plane.h"
-#include "renderer/film/raw_sums.h"
+#include "renderer/core/raw_sums.h"
 
 namespace braid {
 

@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "renderer/core/hash.h"
-#include "renderer/film/box_sum.h"
+#include "renderer/core/box_sum.h"
 
 namespace braid {
 

@@ -7,7 +7,7 @@
 
 #include <doctest/doctest.h>
 
-#include "renderer/film/box_sum.h"
+#include "renderer/core/box_sum.h"
 #include "renderer/film/film.h"
 #include "tests/film/film_passes.h"
 

@@ -13,7 +13,7 @@
 
 #include "renderer/core/hash.h"
 #include "renderer/film/film.h"
-#include "renderer/film/moments.h"
+#include "renderer/core/moments.h"
 #include "tests/film/exact_sums.h"
 
 namespace braid::test_stiff_film {
@@ -167,7 +167,7 @@ std::string beyondRange(const Rgb<float>& image, const std::vector<PixelStatisti
 }
 
 // The first variance that is not the exact one to 10^-6; "" if there is none. Variances beyond the range of floats are
-// the largest float, and those that rounding alone can make are zero (renderer/film/moments.h).
+// the largest float, and those that rounding alone can make are zero (renderer/core/moments.h).
 std::string wrongVariance(const Rgb<float>& variance, const std::vector<PixelStatistics>& expected) {
   for (size_t c = 0; c < 3; ++c)
     for (size_t i = 0; i < expected.size(); ++i) {

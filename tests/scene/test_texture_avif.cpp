@@ -9,7 +9,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/scene/data/textures/texture.h"
-#include "tests/support/avif_writer.h"
+#include "tests/support/textures/avif_writer.h"
 #include "tests/support/gltf_fixture.h"
 
 namespace braid::test_texture_avif {

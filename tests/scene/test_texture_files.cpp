@@ -13,7 +13,7 @@
 #include "renderer/core/error.h"
 #include "renderer/film/files/exr.h"
 #include "renderer/scene/data/textures/texture.h"
-#include "tests/support/ktx2_writer.h"
+#include "tests/support/textures/ktx2_writer.h"
 
 namespace braid::test_texture_files {
 

@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <new>
 
-#include "renderer/core/pixel_memory.h"
+#include "renderer/core/pixel_buffer.h"
 
 namespace {
 

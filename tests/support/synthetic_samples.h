@@ -11,7 +11,7 @@
 #include "renderer/core/hash.h"
 #include "renderer/core/parallel.h"
 #include "combiners/method.h"
-#include "renderer/film/moments.h"
+#include "renderer/core/moments.h"
 
 namespace braid::test {
 

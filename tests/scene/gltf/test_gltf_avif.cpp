@@ -4,7 +4,7 @@
 
 #include <doctest/doctest.h>
 
-#include "tests/support/avif_writer.h"
+#include "tests/support/textures/avif_writer.h"
 #include "tests/support/gltf_fixture.h"
 
 namespace braid::test_gltf_avif {

@@ -7,7 +7,7 @@
 #include <doctest/doctest.h>
 
 #include "tests/support/gltf_fixture.h"
-#include "tests/support/ktx2_writer.h"
+#include "tests/support/textures/ktx2_writer.h"
 
 namespace braid::test_gltf_ktx2 {
 

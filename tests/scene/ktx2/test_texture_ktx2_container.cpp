@@ -13,7 +13,7 @@
 
 #include "renderer/scene/data/ktx2/ktx2.h"
 #include "renderer/scene/data/textures/ktx2_image.h"
-#include "tests/support/ktx2_writer.h"
+#include "tests/support/textures/ktx2_writer.h"
 
 namespace braid::test_texture_ktx2_container {
 

@@ -9,7 +9,7 @@
 
 #include "renderer/scene/data/ktx2/etc1s.h"
 #include "renderer/scene/data/ktx2/ktx2.h"
-#include "tests/support/basis_lz_writer.h"
+#include "tests/support/textures/basis_lz_writer.h"
 
 namespace braid::test_texture_ktx2_etc1s {
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <random>
 
-#include "tests/support/ktx2_writer.h"
+#include "tests/support/textures/ktx2_writer.h"
 
 namespace braid::test {
 
