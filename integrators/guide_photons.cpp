@@ -52,13 +52,7 @@ class PhotonWalks {
     const SampleBlock u = sampler_.block(key, 1);
     const double select =
         (static_cast<double>(item) + static_cast<double>(u.u[slot::kLightSelect])) / static_cast<double>(kPaths);
-    const float time = context_.scene.timeAt(u.u[slot::kExtra]);
-    LightStart light;
-    if (emission_.sample(select, {u.u[slot::kLightU], u.u[slot::kLightV]}, {u.u[slot::kBsdfU], u.u[slot::kBsdfV]}, time,
-                         light))
-      batch.startLight(key, light, emission_.mediaAt(light));
-    else
-      batch.startNothing();
+    batch.startLight(key, emission_, select, u, context_.scene.timeAt(u.u[slot::kExtra]));
   }
 
   const TransportContext& context_;

@@ -5,8 +5,8 @@
 #include <memory>
 
 #include "integrators/camera_paths.h"
-#include "renderer/session/path_time.h"
 #include "renderer/core/error.h"
+#include "renderer/session/path_time.h"
 #include "renderer/transport/dispersion.h"
 #include "renderer/transport/mis.h"
 #include "renderer/transport/shadow_ray.h"

@@ -10,10 +10,10 @@
 
 #include <fmt/format.h>
 
-#include "combiners/statistics/half_estimate.h"
 #include "combiners/pipeline/invalid_pixels.h"
 #include "combiners/pipeline/spatial_variance.h"
 #include "combiners/pixels/plane_mean.h"
+#include "combiners/statistics/half_estimate.h"
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 #include "renderer/core/pixel_buffer.h"

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "renderer/core/parallel.h"
 #include "renderer/core/box_sum.h"
+#include "renderer/core/parallel.h"
 
 namespace braid {
 

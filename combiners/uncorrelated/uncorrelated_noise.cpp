@@ -7,8 +7,8 @@
 
 #include "combiners/pixels/finite_float.h"
 #include "combiners/shrinkage/shrinkage.h"
-#include "renderer/core/parallel.h"
 #include "renderer/core/box_sum.h"
+#include "renderer/core/parallel.h"
 
 namespace braid {
 

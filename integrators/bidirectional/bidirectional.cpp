@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "integrators/camera_paths.h"
-#include "renderer/session/path_time.h"
 #include "integrators/tiles.h"
+#include "renderer/session/path_time.h"
 
 namespace braid {
 
@@ -51,12 +51,7 @@ void LightPaths::start(SubpathBatch& batch, uint64_t item, float time) const {
   const SampleBlock u = sampler.block(key, 1);
   const double select =
       static_cast<double>(u.u[slot::kLightSelect]) + static_cast<double>(u.u[slot::kRoulette]) * 0x1p-24;
-  LightStart start;
-  if (emission.sample(select, {u.u[slot::kLightU], u.u[slot::kLightV]}, {u.u[slot::kBsdfU], u.u[slot::kBsdfV]}, time,
-                      start))
-    batch.startLight(key, start, emission.mediaAt(start));
-  else
-    batch.startNothing();
+  batch.startLight(key, emission, select, u, time);
 }
 
 void ConnectionQueue::flush() {

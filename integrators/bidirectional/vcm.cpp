@@ -9,10 +9,10 @@
 
 #include "integrators/bidirectional/bidirectional.h"
 #include "integrators/light_preparation.h"
-#include "renderer/session/path_time.h"
 #include "integrators/registry.h"
 #include "integrators/tiles.h"
 #include "renderer/core/parallel.h"
+#include "renderer/session/path_time.h"
 
 namespace braid {
 

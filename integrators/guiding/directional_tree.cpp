@@ -24,9 +24,8 @@ class Builder {
  public:
   Builder(std::vector<DirectionalNode>& nodes, float total) : nodes_(nodes), threshold_(kCutShare * total) {}
 
-  // Returns the square's part of the density, not normalised: its power. The places are relative to the
-  // square. `link` is where its node's index goes, if it has one.
-  float build(std::span<DirectionalPoint> points, float area, int depth, uint32_t* link) {
+  // Returns the square's power. The places are relative to the square. `link` is where its node's index goes, if it has one.
+  float build(std::span<DirectionalPoint> points, int depth, uint32_t* link) {
     float power = 0;
     for (const DirectionalPoint& p : points) power += p.power;
     const bool cut = depth == 0 || (power > threshold_ && points.size() >= kCutPoints && depth < kDeepest);
@@ -34,11 +33,11 @@ class Builder {
     const auto index = static_cast<uint32_t>(nodes_.size());
     nodes_.emplace_back();
     if (link) *link = index;
-    return buildQuarters(points, area, depth, index);
+    return buildQuarters(points, depth, index);
   }
 
  private:
-  float buildQuarters(std::span<DirectionalPoint> points, float area, int depth, uint32_t index) {
+  float buildQuarters(std::span<DirectionalPoint> points, int depth, uint32_t index) {
     std::array<std::span<DirectionalPoint>, 4> quarter;
     const auto split = [](std::span<DirectionalPoint> all, int axis) {
       const auto middle =
@@ -57,7 +56,7 @@ class Builder {
     for (size_t q = 0; q < 4; ++q) {
       for (DirectionalPoint& p : quarter[q]) quarterOf(p.place);
       uint32_t child = 0;
-      part[q] = build(quarter[q], 0.25f * area, depth + 1, &child);
+      part[q] = build(quarter[q], depth + 1, &child);
       nodes_[index].child[q] = child;
       sum += part[q];
     }
@@ -98,7 +97,7 @@ std::vector<DirectionalNode> buildDirectionalTree(std::vector<DirectionalPoint>&
   float total = 0;
   for (const DirectionalPoint& p : points) total += p.power;
   std::vector<DirectionalNode> nodes;
-  Builder(nodes, total).build(points, 1, 0, nullptr);
+  Builder(nodes, total).build(points, 0, nullptr);
   return nodes;
 }
 

@@ -5,12 +5,12 @@
 #include <fmt/format.h>
 
 #include "integrators/light_preparation.h"
-#include "renderer/session/path_time.h"
 #include "integrators/registry.h"
 #include "integrators/sppm/sppm_eye.h"
 #include "integrators/sppm/sppm_gather.h"
 #include "integrators/sppm/sppm_preparation.h"
 #include "integrators/tiles.h"
+#include "renderer/session/path_time.h"
 
 namespace braid {
 

@@ -51,12 +51,7 @@ uint64_t followLightPaths(const TransportContext& context, const PhotonEmission&
       const SampleBlock u = light.sampler.block(key, 1);
       const double select =
           (static_cast<double>(item) + static_cast<double>(u.u[slot::kLightSelect])) / static_cast<double>(light.paths);
-      LightStart start;
-      if (light.emission.sample(select, {u.u[slot::kLightU], u.u[slot::kLightV]},
-                                {u.u[slot::kBsdfU], u.u[slot::kBsdfV]}, light.time, start))
-        batch.startLight(key, start, light.emission.mediaAt(start));
-      else
-        batch.startNothing();
+      batch.startLight(key, light.emission, select, u, light.time);
     }
     batch.run([&](int i, const SubpathState& state,
                   const SubpathVertex& vertex) { return onVertex(first + static_cast<uint64_t>(i), state, vertex); },

@@ -5,8 +5,8 @@
 
 #include <optional>
 
-#include "renderer/session/preparation_ref.h"
 #include "integrators/sppm/sppm_photons.h"
+#include "renderer/session/preparation_ref.h"
 
 namespace braid {
 

@@ -2,9 +2,9 @@
 #include <utility>
 
 #include "renderer/core/error.h"
+#include "renderer/core/moments.h"
 #include "renderer/core/parallel.h"
 #include "renderer/film/film.h"
-#include "renderer/core/moments.h"
 
 namespace braid {
 

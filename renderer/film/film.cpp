@@ -5,10 +5,10 @@
 #include <cmath>
 #include <utility>
 
-#include "renderer/core/error.h"
-#include "renderer/core/parallel.h"
 #include "renderer/core/box_sum.h"
+#include "renderer/core/error.h"
 #include "renderer/core/moments.h"
+#include "renderer/core/parallel.h"
 
 namespace braid {
 

@@ -11,8 +11,8 @@
 
 #include "renderer/core/parallel.h"
 #include "renderer/core/plane.h"
-#include "renderer/film/features.h"
 #include "renderer/core/raw_sums.h"
+#include "renderer/film/features.h"
 #include "renderer/film/sample_placement.h"
 
 namespace braid {

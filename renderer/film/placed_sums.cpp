@@ -3,10 +3,10 @@
 
 #include <algorithm>
 
-#include "renderer/core/error.h"
-#include "renderer/core/parallel.h"
 #include "renderer/core/box_sum.h"
+#include "renderer/core/error.h"
 #include "renderer/core/moments.h"
+#include "renderer/core/parallel.h"
 
 namespace braid {
 

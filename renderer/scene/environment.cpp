@@ -13,15 +13,6 @@ namespace {
 // Of radiance that is left to surfaces: nothing may be impossible, as photons come from here as well.
 constexpr float kRest = 0.05f;
 
-// Interval of a normalised cumulative table that holds u, and the position of u within it.
-size_t findInterval(const float* cdf, size_t count, float u, float& fraction) {
-  const float* upper = std::upper_bound(cdf, cdf + count + 1, u);
-  const size_t i = static_cast<size_t>(std::clamp<ptrdiff_t>(upper - cdf - 1, 0, static_cast<ptrdiff_t>(count) - 1));
-  const float width = cdf[i + 1] - cdf[i];
-  fraction = width > 0 ? std::clamp((u - cdf[i]) / width, 0.0f, kOneMinusEpsilon) : 0.5f;
-  return i;
-}
-
 // The cumulative table of row y, width + 1 values from 0 to 1, and the mean density of its texels. That of a texel is
 // the mean of the bilinear interpolant over it (weights 1/8, 3/4, 1/8 on each axis), so that it is positive wherever
 // the interpolated radiance is.
@@ -151,10 +142,10 @@ float Environment::sample(const Vec3& normal, Vec2 u, Vec3& direction, Spectrum&
   Vec2 at;
   float ratio = 1;
   if (isBlack(normal)) {
-    const size_t y = findInterval(marginal_.data(), static_cast<size_t>(height_), u.y, at.y);
-    const float* row = &conditional_[y * (static_cast<size_t>(width_) + 1)];
-    const size_t x = findInterval(row, static_cast<size_t>(width_), u.x, at.x);
-    at = Vec2(placeIn(x, at.x), placeIn(y, at.y));
+    const int y = findStep([&](int k) { return marginal_[static_cast<size_t>(k)]; }, height_, u.y);
+    const float* row = &conditional_[static_cast<size_t>(y) * (static_cast<size_t>(width_) + 1)];
+    const int x = findStep([&](int k) { return row[k]; }, width_, u.x);
+    at = Vec2(withinTexel(static_cast<size_t>(x), u.x), withinTexel(static_cast<size_t>(y), u.y));
   } else {
     ratio = blocks_.sample(texels(), toLocal(normal), u, at);
     if (!(ratio > 0)) return 0;

@@ -14,21 +14,6 @@ namespace {
 constexpr double kRegardless = 0.05;
 constexpr int kPointsPerAxis = 4;  // of the mean cosine over a block
 
-// The index i in [0, count) with f(i) <= u < f(i + 1) of an increasing f, and where between the two u is.
-template <class F>
-int findStep(const F& f, int count, float& u) {
-  int low = 0, high = count;
-  float below = f(0), above = f(count);
-  while (high - low > 1) {
-    const int middle = (low + high) / 2;
-    const float value = f(middle);
-    (value <= u ? low : high) = middle;
-    (value <= u ? below : above) = value;
-  }
-  u = above > below ? std::clamp((u - below) / (above - below), 0.0f, kOneMinusEpsilon) : 0.5f;
-  return low;
-}
-
 Vec3 directionTo(float column, float row, int width, int height) {
   const float theta = kPi * row / static_cast<float>(height);
   const float phi = 2 * kPi * (column / static_cast<float>(width) - 0.5f);
@@ -146,7 +131,7 @@ float EnvironmentBlocks::sample(const TexelDistribution& of, const Vec3& normal,
   // Differences first: of a small share of the row little else would be left.
   u.x *= cdf[end] - cdf[begin];
   const int x = begin + findStep([&](int k) { return cdf[begin + k] - cdf[begin]; }, end - begin, u.x);
-  position = Vec2(placeIn(static_cast<size_t>(x), u.x), placeIn(static_cast<size_t>(y), u.y));
+  position = Vec2(withinTexel(static_cast<size_t>(x), u.x), withinTexel(static_cast<size_t>(y), u.y));
   return (at(m, leftOf(column + 1, row)) - at(m, leftOf(column, row))) / share_[block];
 }
 

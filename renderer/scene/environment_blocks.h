@@ -21,8 +21,23 @@ struct TexelDistribution {
   int width = 0, height = 0;
 };
 
+// The index i in [0, count) with f(i) <= u < f(i + 1) of an increasing f, and where between the two u is.
+template <class F>
+int findStep(const F& f, int count, float& u) {
+  int low = 0, high = count;
+  float below = f(0), above = f(count);
+  while (high - low > 1) {
+    const int middle = (low + high) / 2;
+    const float value = f(middle);
+    (value <= u ? low : high) = middle;
+    (value <= u ? below : above) = value;
+  }
+  u = above > below ? std::clamp((u - below) / (above - below), 0.0f, kOneMinusEpsilon) : 0.5f;
+  return low;
+}
+
 // i + fraction, and below i + 1 where floats are too coarse for the sum: a place stays in its texel.
-inline float placeIn(size_t i, float fraction) {
+inline float withinTexel(size_t i, float fraction) {
   return std::min(static_cast<float>(i) + fraction, static_cast<float>(i + 1) * kOneMinusEpsilon);
 }
 

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "renderer/core/hash.h"
 #include "renderer/core/box_sum.h"
+#include "renderer/core/hash.h"
 
 namespace braid {
 

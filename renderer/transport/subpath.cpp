@@ -101,6 +101,16 @@ void SubpathBatch::startLight(uint64_t key, const LightStart& start, const Media
     s.chain = sqr(static_cast<double>(start.cosLight) / static_cast<double>(start.pdfEmit));
 }
 
+void SubpathBatch::startLight(uint64_t key, const LightEmission& emission, double select, const SampleBlock& u,
+                              float time) {
+  LightStart start;
+  if (emission.sample(select, {u.u[slot::kLightU], u.u[slot::kLightV]}, {u.u[slot::kBsdfU], u.u[slot::kBsdfV]}, time,
+                      start))
+    startLight(key, start, emission.mediaAt(start));
+  else
+    startNothing();
+}
+
 void SubpathBatch::startNothing() {
   BRAID_ASSERT(count_ < kBatch);
   SubpathState& s = *std::construct_at(&state_[static_cast<size_t>(count_++)]);

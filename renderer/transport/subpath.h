@@ -141,6 +141,9 @@ class SubpathBatch {
   void startCamera(uint64_t key, const Camera::CameraRay& ray, const MediaStack& media, double pdfPixel,
                    double lightPaths, bool orthographic);
   void startLight(uint64_t key, const LightStart& start, const MediaStack& media);
+  // From the light that `select` picks, by block 1 of the walk's random numbers; a walk that ends at once where nothing
+  // is emitted.
+  void startLight(uint64_t key, const LightEmission& emission, double select, const SampleBlock& u, float time);
   // A walk that begins with zero throughput and ends at once, to keep indices in step.
   void startNothing();
   void clear() { count_ = 0; }

@@ -12,8 +12,8 @@
 #include <doctest/doctest.h>
 
 #include "renderer/core/hash.h"
-#include "renderer/film/film.h"
 #include "renderer/core/moments.h"
+#include "renderer/film/film.h"
 #include "tests/film/exact_sums.h"
 
 namespace braid::test_stiff_film {

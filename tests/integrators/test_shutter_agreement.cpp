@@ -2,8 +2,8 @@
 // Motion blur: all integrators on one scene of which everything moves, and stills of it.
 #include <doctest/doctest.h>
 
-#include "tests/support/statistics/seed_means.h"
 #include "tests/support/moving_scenes.h"
+#include "tests/support/statistics/seed_means.h"
 
 namespace braid::test_shutter_agreement {
 

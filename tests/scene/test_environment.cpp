@@ -202,9 +202,9 @@ TEST_CASE("An environment lies as in three.js and in Blender: its centre in +X, 
 TEST_CASE(
     "A place in a texel stays there, however coarse floats are, and images of one bright row are sampled safely") {
   for (const size_t i : {size_t(0), size_t(1), size_t(22), size_t(899), size_t(4095), size_t(8191), size_t(65535)}) {
-    CHECK(static_cast<size_t>(placeIn(i, 0)) == i);
-    CHECK(static_cast<size_t>(placeIn(i, 0.5f)) == i);
-    CHECK(static_cast<size_t>(placeIn(i, kOneMinusEpsilon)) == i);
+    CHECK(static_cast<size_t>(withinTexel(i, 0)) == i);
+    CHECK(static_cast<size_t>(withinTexel(i, 0.5f)) == i);
+    CHECK(static_cast<size_t>(withinTexel(i, kOneMinusEpsilon)) == i);
   }
   const Environment environment(environmentImage(8, 900, [](int, int y) { return Spectrum(y == 899 ? 1.0f : 0.0f); }));
   Rng rng(14);

@@ -9,8 +9,8 @@
 
 #include "renderer/core/error.h"
 #include "renderer/scene/data/textures/texture.h"
-#include "tests/support/textures/avif_writer.h"
 #include "tests/support/gltf_fixture.h"
+#include "tests/support/textures/avif_writer.h"
 
 namespace braid::test_texture_avif {
 

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "renderer/core/hash.h"
-#include "renderer/core/parallel.h"
 #include "combiners/method.h"
+#include "renderer/core/hash.h"
 #include "renderer/core/moments.h"
+#include "renderer/core/parallel.h"
 
 namespace braid::test {
 

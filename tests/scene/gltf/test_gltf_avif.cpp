@@ -4,8 +4,8 @@
 
 #include <doctest/doctest.h>
 
-#include "tests/support/textures/avif_writer.h"
 #include "tests/support/gltf_fixture.h"
+#include "tests/support/textures/avif_writer.h"
 
 namespace braid::test_gltf_avif {
 

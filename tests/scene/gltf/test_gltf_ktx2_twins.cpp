@@ -11,8 +11,8 @@
 
 #include "braid/braid.h"
 #include "renderer/scene/data/textures/texture.h"
-#include "tests/support/textures/basis_lz_writer.h"
 #include "tests/support/gltf_fixture.h"
+#include "tests/support/textures/basis_lz_writer.h"
 
 namespace braid::test_gltf_ktx2_twins {
 
