@@ -5,7 +5,7 @@
 #include <string>
 
 #include "combiners/pipeline/pipeline.h"
-#include "renderer/session/placement.h"
+#include "renderer/session/placement_map.h"
 
 namespace braid {
 

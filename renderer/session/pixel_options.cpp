@@ -6,7 +6,7 @@
 #include "renderer/core/hash.h"
 #include "renderer/session/integrator.h"
 #include "renderer/session/pixel_filter.h"
-#include "renderer/session/placement.h"
+#include "renderer/session/placement_map.h"
 #include "renderer/session/rendering_revision.h"
 
 namespace braid {

@@ -11,7 +11,7 @@
 #include "renderer/session/film_of_plan.h"
 #include "renderer/session/integrator.h"
 #include "renderer/session/pixel_filter.h"
-#include "renderer/session/placement.h"
+#include "renderer/session/placement_map.h"
 
 namespace braid {
 

@@ -13,7 +13,7 @@
 #include "renderer/core/log.h"
 #include "renderer/film/film_state.h"
 #include "renderer/session/integrator.h"
-#include "renderer/session/placement.h"
+#include "renderer/session/placement_map.h"
 #include "renderer/session/plan.h"
 
 namespace braid {

@@ -8,7 +8,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/film/files/state_file.h"
-#include "renderer/session/placement.h"
+#include "renderer/session/placement_map.h"
 #include "tools/options/file_uses.h"
 
 namespace braid {

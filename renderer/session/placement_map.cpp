@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "renderer/session/placement.h"
+#include "renderer/session/placement_map.h"
 
 #include <algorithm>
 #include <bit>
