@@ -254,7 +254,8 @@ Applies guidingApplies(const Plan& plan) {
   // TRAP: trial passes are independent. These points serve unguided paths so much better than guided ones, whose
   // choices cut their patterns up, that a promise by independent ones is not kept.
   if (s.sampler == SamplerKind::Sobol)
-    return {false, "with Sobol' points it costs more than it gains on most scenes (--guiding on, or --sampler independent)"};
+    return {false,
+            "with Sobol' points it costs more than it gains on most scenes (--guiding on, or --sampler independent)"};
   if (static_cast<uint64_t>(s.width) * static_cast<uint64_t>(s.height) < kFewestPixels)
     return {false,
             fmt::format("the frame has fewer than {} pixels: learning would cost more than them", kFewestPixels)};

@@ -24,7 +24,7 @@ class Builder {
  public:
   Builder(std::vector<DirectionalNode>& nodes, float total) : nodes_(nodes), threshold_(kCutShare * total) {}
 
-  // Returns the square's power. The places are relative to the square. `link` is where its node's index goes, if it has one.
+  // Returns the square's power. The places are relative to the square. `link` is where its node's index goes, if any.
   float build(std::span<DirectionalPoint> points, int depth, uint32_t* link) {
     float power = 0;
     for (const DirectionalPoint& p : points) power += p.power;
