@@ -104,6 +104,40 @@ def pressed(scene, path):
     return pixels(path)
 
 
+def turn_a_sky_over(scene):
+    """An environment of smooth colours behind a Mapping node that turns it about all three axes; nothing else."""
+    for thing in [thing for thing in bpy.data.objects if thing.type != "CAMERA"]:
+        bpy.data.objects.remove(thing)
+    bpy.ops.mesh.primitive_plane_add(size=0.01, location=(0, 0, -50))
+    sky = bpy.data.images.new("sky", 128, 64, float_buffer=True)
+    y, x = np.mgrid[0:64, 0:128]
+    values = np.ones((64, 128, 4), np.float32)
+    values[..., 0] = 1 + np.cos(2 * np.pi * x / 128)
+    values[..., 1] = 1 + np.sin(2 * np.pi * x / 128)
+    values[..., 2] = 2 * y / 64
+    sky.pixels = values.ravel().tolist()
+    tree = scene.world.node_tree
+    kinds = ("ShaderNodeTexEnvironment", "ShaderNodeMapping", "ShaderNodeTexCoord")
+    texture, mapping, place = (tree.nodes.new(kind) for kind in kinds)
+    texture.image = sky
+    mapping.inputs["Rotation"].default_value = (0.4, -0.3, 1.9)
+    tree.links.new(place.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
+    tree.links.new(texture.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+    scene.camera.data.lens, scene.camera.rotation_euler = 12, (1.9, 0.2, 0.7)
+
+
+def check_turned_sky(scene, folder):
+    turn_a_sky_over(scene)
+    scene.render.engine, scene.braid.samples, scene.cycles.samples = "BRAID", 4, 16
+    ours = pressed(scene, folder / "sky.exr")
+    scene.render.engine = "CYCLES"
+    theirs = pressed(scene, folder / "cycles_sky.exr")
+    apart = np.abs(ours - theirs).max() / theirs.mean()
+    print("turned sky, largest difference over the mean:", f"{apart:.4f}")
+    assert apart < 0.1, apart
+
+
 def main():
     braid_render.register()
     scene = build()
@@ -128,6 +162,8 @@ def main():
     print("brightness over Cycles by channel:", *(f"{r:.4f}" for r in ratio), "mean difference:", f"{apart:.4f}")
     assert np.all(np.abs(ratio - 1) < 0.03), ratio
     assert apart < 0.08, apart
+
+    check_turned_sky(scene, folder)
 
     scene.render.engine, os.environ["BRAID"] = "BRAID", "/nowhere/braid"
     try:

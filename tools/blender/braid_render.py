@@ -101,6 +101,49 @@ def linear_pixels(image):
     return np.where(pixels <= 0.04045, pixels / 12.92, ((pixels + 0.055) / 1.055) ** 2.4)
 
 
+def upstream(socket, kind):
+    """The node of a kind that feeds a socket; none where another does, or nothing."""
+    return next((link.from_node for link in socket.links if link.from_node.type == kind), None)
+
+
+def directions(height, width):
+    """(height, width, 3): the direction of every pixel, as Blender lays an equirectangular image out."""
+    azimuth = math.pi * (1 - 2 * (np.arange(width) + 0.5) / width)[None, :]
+    altitude = math.pi * ((np.arange(height) + 0.5) / height - 0.5)[:, None]
+    level = np.cos(altitude)
+    return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(altitude) + 0 * azimuth], axis=-1)
+
+
+def mapped(mapping, vectors):
+    """What a Mapping node makes of vectors; sockets that other nodes feed count as their own values."""
+    def value(name):
+        return np.array(mapping.inputs[name].default_value[:]) if name in mapping.inputs else np.zeros(3)
+
+    turn = np.array(mapping.inputs["Rotation"].default_value.to_matrix())
+    scale, kind = value("Scale"), mapping.vector_type
+    if kind == "TEXTURE":
+        return ((vectors - value("Location")) @ turn) / np.where(scale == 0, 1, scale)
+    vectors = vectors / np.where(scale == 0, 1, scale) if kind == "NORMAL" else vectors * scale
+    return vectors @ turn.T + (value("Location") if kind == "POINT" else 0)
+
+
+def turned(pixels, mapping):
+    """The image as the world shows it behind its Mapping node: every pixel mixes the four that its direction meets."""
+    height, width = pixels.shape[:2]
+    vectors = mapped(mapping, directions(height, width))
+    length = np.maximum(np.linalg.norm(vectors, axis=-1), 1e-30)
+    column = (0.5 - np.arctan2(vectors[..., 1], vectors[..., 0]) / (2 * math.pi)) * width - 0.5
+    row = (0.5 + np.arcsin(np.clip(vectors[..., 2] / length, -1, 1)) / math.pi) * height - 0.5
+    left, low = np.floor(column).astype(int), np.floor(row).astype(int)
+    right_share, high_share = (column - left)[..., None], (row - low)[..., None]
+
+    def line(y):
+        y = np.clip(y, 0, height - 1)
+        return (1 - right_share) * pixels[y, left % width] + right_share * pixels[y, (left + 1) % width]
+
+    return ((1 - high_share) * line(low) + high_share * line(low + 1)).astype(np.float32)
+
+
 def world_radiance(world):
     """Pixels of the environment, W/(sr m2); none where the world is black."""
     if world is None:
@@ -110,9 +153,11 @@ def world_radiance(world):
     if node:
         strength = node.inputs["Strength"].default_value
         pixels = np.array(node.inputs["Color"].default_value[:3], np.float32)[None, None]
-        for link in node.inputs["Color"].links:
-            if getattr(link.from_node, "image", None):
-                pixels = linear_pixels(link.from_node.image)
+        texture = upstream(node.inputs["Color"], "TEX_ENVIRONMENT")
+        if texture and texture.image:
+            pixels = linear_pixels(texture.image)
+            mapping = upstream(texture.inputs["Vector"], "MAPPING")
+            pixels = turned(pixels, mapping) if mapping else pixels
     pixels = strength * pixels
     return pixels if pixels.max() > 0 else None
 
