@@ -6,7 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "integrators/guide_photons.h"
+#include "integrators/guiding/guide_photons.h"
+#include "integrators/guiding/pixel_grid.h"
 #include "integrators/path_kernel.h"
 #include "renderer/core/parallel.h"
 
@@ -37,33 +38,13 @@ constexpr double kHopeless = 0.9;
 constexpr double kMostDirect = 0.85;
 // Of a shadow ray and of a guided vertex, in rays.
 constexpr double kShadowCost = 0.4, kGuidedCost = 0.5;
-// What counts as the brightness of a black pixel: this share of the mean.
-constexpr double kDarkest = 0.1;
 // Samples above this many times their pixel's brightness count as that.
 constexpr double kMostRelative = 32;
 
-// Pixels of the full frame on a square grid.
-struct Grid {
-  explicit Grid(const Settings& s) {
-    const uint64_t pixels = static_cast<uint64_t>(s.width) * static_cast<uint64_t>(s.height);
-    const uint64_t places = std::clamp(pixels / 16, kFewestPlaces, kMostPlaces);
-    stride = 1;
-    while (count(s, stride) > places) ++stride;
-    columns = (s.width + stride - 1) / stride;
-    rows = (s.height + stride - 1) / stride;
-    width = s.width;
-    height = s.height;
-  }
-  static uint64_t count(const Settings& s, int stride) {
-    return static_cast<uint64_t>((s.width + stride - 1) / stride) *
-           static_cast<uint64_t>((s.height + stride - 1) / stride);
-  }
-  size_t size() const { return static_cast<size_t>(columns) * static_cast<size_t>(rows); }
-  int x(size_t i) const { return std::min(static_cast<int>(i) % columns * stride + stride / 2, width - 1); }
-  int y(size_t i) const { return std::min(static_cast<int>(i) / columns * stride + stride / 2, height - 1); }
-
-  int stride, columns, rows, width, height;
-};
+uint64_t places(const Settings& s) {
+  const uint64_t pixels = static_cast<uint64_t>(s.width) * static_cast<uint64_t>(s.height);
+  return std::clamp(pixels / 16, kFewestPlaces, kMostPlaces);
+}
 
 struct Cost {
   uint64_t rays = 0, shadowRays = 0, guided = 0;
@@ -81,7 +62,8 @@ struct Cost {
 
 class Training {
  public:
-  Training(const TransportContext& context, const Plan& plan) : context_(context), plan_(plan), grid_(plan.settings) {}
+  Training(const TransportContext& context, const Plan& plan)
+      : context_(context), plan_(plan), grid_(plan.settings, places(plan.settings)) {}
 
   void run(const Round& round) {
     const size_t pixels = grid_.size(), first = pass_.size();
@@ -143,7 +125,7 @@ class Training {
   Cost trace(const PassSampler& sampler, Pass& pass, Chunk chunk, PathRecorder& recorder,
              std::vector<GuideRecord>& found) const {
     PathKernel kernel(context_, plan_, sampler, nullptr);
-    kernel.guideBy(pass.guided ? &guide_ : nullptr);
+    kernel.use({.guide = pass.guided ? &guide_ : nullptr});
     kernel.teach(&recorder);
     recorder.begin();
     for (size_t i = chunk.begin; i < chunk.end; ++i)
@@ -177,23 +159,9 @@ class Training {
   // For each pixel 1 / its brightness, the mean over its surroundings.
   std::vector<float> scales() const {
     std::vector<double> mean(grid_.size(), 0.0);
-    double whole = 0;
-    for (size_t i = 0; i < mean.size(); ++i) {
+    for (size_t i = 0; i < mean.size(); ++i)
       for (const Pass& p : pass_) mean[i] += static_cast<double>(p.sample[i].value) / static_cast<double>(pass_.size());
-      whole += mean[i] / static_cast<double>(mean.size());
-    }
-    std::vector<float> scale(grid_.size());
-    constexpr int kRadius = 2;
-    for (int y = 0; y < grid_.rows; ++y)
-      for (int x = 0; x < grid_.columns; ++x) {
-        double sum = 0, count = 0;
-        for (int v = std::max(0, y - kRadius); v <= std::min(grid_.rows - 1, y + kRadius); ++v)
-          for (int u = std::max(0, x - kRadius); u <= std::min(grid_.columns - 1, x + kRadius); ++u, ++count)
-            sum += mean[static_cast<size_t>(v * grid_.columns + u)];
-        const double brightness = sum / count + kDarkest * whole;
-        scale[static_cast<size_t>(y * grid_.columns + x)] = brightness > 0 ? static_cast<float>(1 / brightness) : 0.0f;
-      }
-    return scale;
+    return grid_.inverseBrightness(mean);
   }
 
   template <class Part>
@@ -215,7 +183,7 @@ class Training {
 
   const TransportContext& context_;
   const Plan& plan_;
-  const Grid grid_;
+  const PixelGrid grid_;
   std::vector<Pass> pass_;
   std::vector<GuidePhoton> photons_;
   std::vector<GuideRecord> records_;
@@ -265,15 +233,15 @@ Applies guidingApplies(const Plan& plan) {
 uint64_t guidingBytes(const Plan& plan) {
   // Of a record: itself, its copy while it is sorted, and the same of its part of the last round; the guide.
   constexpr uint64_t kRecordBytes = 2 * sizeof(GuideRecord) + 32;
-  return Grid(plan.settings).size() * kPasses * PathRecorder::kMostVertices * kRecordBytes +
+  return PixelGrid(plan.settings, places(plan.settings)).size() * kPasses * PathRecorder::kMostVertices * kRecordBytes +
          kMostGuidePhotons * 2 * sizeof(GuidePhoton);
 }
 
 GuidePreparation::GuidePreparation(const TransportContext& context, const Plan& plan) {
   if (!guidingApplies(plan).yes) return;
   Training training(context, plan);
-  decision_ = train(training, plan.settings);
-  if (decision_->kept) guide_ = training.take();
+  decisions_ = {train(training, plan.settings)};
+  if (decisions_[0].kept) guide_ = training.take();
 }
 
 }  // namespace braid

@@ -6,7 +6,7 @@
 #pragma once
 
 #include <optional>
-#include <string>
+#include <vector>
 
 #include "integrators/guiding/guide.h"
 #include "renderer/session/preparation_ref.h"
@@ -24,13 +24,13 @@ class GuidePreparation : public Preparation {
 
   // Null where paths are not guided, as it would not pay.
   const Guide* guide() const { return guide_ ? &*guide_ : nullptr; }
-  std::optional<PlanLine> decision() const override { return decision_; }
+  std::vector<PlanLine> decisions() const override { return decisions_; }
 
   using Ref = PreparationRef<GuidePreparation>;
 
  private:
   std::optional<Guide> guide_;
-  std::optional<PlanLine> decision_;
+  std::vector<PlanLine> decisions_;
 };
 
 }  // namespace braid

@@ -25,6 +25,16 @@ const Vec3& receiverNormal(const Hit& hit, bool twoSided) { return twoSided ? hi
 
 }  // namespace
 
+LightChoice lightChoice(const SampleBlock& block, int k, int count) {
+  // Steps of the plastic number: places of any number of samples are far from each other (Roberts 2018, R2).
+  constexpr float kStepU = 0.7548777f, kStepV = 0.5698403f;
+  const auto t = static_cast<float>(k), n = static_cast<float>(count);
+  const auto shifted = [](float u, float by) { return u + by - std::floor(u + by); };
+  return {shifted(block.u[slot::kLightSelect], t / n),
+          {shifted(block.u[slot::kLightU], t * kStepU), shifted(block.u[slot::kLightV], t * kStepV)},
+          n};
+}
+
 void PathKernel::add(const Spectrum& radiance, bool direct, PathSample& sample) const {
   sample.radiance += radiance;
   if (direct) sample.direct += radiance;
@@ -36,7 +46,8 @@ void PathKernel::addEnvironment(const PathState& path, PathSample& sample) const
   if (isBlack(radiance)) return;
   float weight = 1;
   if (!path.lightCouldNotBeSampled)
-    weight = powerHeuristic(path.lastPdfW, context_.lights.pdfEnvironment(path.lastReceiver(), path.direction));
+    weight = powerHeuristic(
+        path.lastPdfW, path.lastLightSamples * context_.lights.pdfEnvironment(path.lastReceiver(), path.direction));
   add(path.throughput * radiance * weight, path.bounces <= 1, sample);
 }
 
@@ -46,9 +57,10 @@ void PathKernel::addEmission(const PathState& path, const Hit& hit, PathSample& 
   float weight = 1;
   const auto found = path.lightCouldNotBeSampled ? std::nullopt : lightAt(scene_, hit);
   if (found)
-    weight = powerHeuristic(path.lastPdfW,
-                            context_.lights.pdfEmitter(path.lastReceiver(), found->light,
-                                                       glm::length(hit.position - path.lastPosition), found->cosine));
+    weight = powerHeuristic(
+        path.lastPdfW, path.lastLightSamples * context_.lights.pdfEmitter(path.lastReceiver(), found->light,
+                                                                          glm::length(hit.position - path.lastPosition),
+                                                                          found->cosine));
   add(path.throughput * radiance * weight, path.bounces <= 1, sample);
 }
 
@@ -90,10 +102,10 @@ void PathKernel::recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsd
 }
 
 bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided,
-                             const SampleBlock& block, ShadowRay& shadow) const {
+                             const LightChoice& choice, ShadowRay& shadow) const {
   LightSample light;
-  if (!context_.lights.sample({hit.position, receiverNormal(hit, twoSided), twoSided, hit.time},
-                              block.u[slot::kLightSelect], {block.u[slot::kLightU], block.u[slot::kLightV]}, light))
+  if (!context_.lights.sample({hit.position, receiverNormal(hit, twoSided), twoSided, hit.time}, choice.select,
+                              choice.place, light))
     return false;
   const Vec3 wi = hit.frame.toLocal(light.wi);
   const bool reflects = glm::dot(light.wi, hit.ng) > 0;
@@ -102,8 +114,9 @@ bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Guided
   const BsdfValue value = bsdf.evaluate(wi);
   if (isBlack(value.f)) return false;
 
-  const float weight = light.delta ? 1.0f : powerHeuristic(light.pdfW, value.pdfW);
-  shadow.contribution = path.throughput * value.f * light.radiance * (weight / light.pdfW);
+  const float pdfW = choice.count * light.pdfW;
+  const float weight = light.delta ? 1.0f : powerHeuristic(pdfW, value.pdfW);
+  shadow.contribution = path.throughput * value.f * light.radiance * (weight / pdfW);
   setShadowRay(hit, light.wi, light.distance, mix32(path.salt ^ 0x51ed270bu) & ~kCameraRay, shadow.ray);
   const bool volume = context_.summaryOf(hit).volume;
   shadow.index = 1;
@@ -114,6 +127,25 @@ bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const Guided
     shadow.index = mediumIndex(scene_, media);
   }
   return true;
+}
+
+void PathKernel::sampleLights(int p, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided, const SampleBlock& block,
+                              bool forFeatures) {
+  PathState& path = path_[static_cast<size_t>(p)];
+  const int count = path.bounces == 0 ? aids_.lightSamples : 1;
+  path.lastLightSamples = static_cast<float>(count);
+  for (int k = 0; k < count; ++k) {
+    if (shadowCount_ == kBatch) {
+      traceShadows();
+      shadowCount_ = 0;
+    }
+    ShadowRay& shadow = shadow_[static_cast<size_t>(shadowCount_)];
+    if (!sampleLight(path, hit, bsdf, twoSided, lightChoice(block, k, count), shadow)) continue;
+    shadow.forFeatures = forFeatures && k == 0;
+    shadow.direct = path.bounces == 0;
+    shadowRays_.set(shadowCount_, shadow.ray, shadow.index);
+    shadowPath_[static_cast<size_t>(shadowCount_++)] = p;
+  }
 }
 
 // Continues the path in a direction sampled from the BSDF and the guide; false when it ends here.
@@ -257,15 +289,7 @@ void PathKernel::shadeActive() {
       addEnvironment(path_[i], sample_[i]);
       continue;
     }
-    bool hasShadow = false;
-    const bool goesOn =
-        shade(path_[i], hit_[ray], block_[ray], sample_[i], shadow_[static_cast<size_t>(shadowCount_)], hasShadow);
-    if (hasShadow) {
-      const ShadowRay& shadow = shadow_[static_cast<size_t>(shadowCount_)];
-      shadowRays_.set(shadowCount_, shadow.ray, shadow.index);
-      shadowPath_[static_cast<size_t>(shadowCount_++)] = p;
-    }
-    if (!goesOn) continue;
+    if (!shade(p, hit_[ray], block_[ray])) continue;
     active_[static_cast<size_t>(alive)] = p;
     queueRay(alive++, path_[i]);
   }
@@ -289,8 +313,9 @@ void PathKernel::traceShadows() {
   shadowRayCount += static_cast<uint64_t>(shadowCount_);
 }
 
-bool PathKernel::shade(PathState& path, const Hit& hit, const SampleBlock& block, PathSample& sample, ShadowRay& shadow,
-                       bool& hasShadow) {
+bool PathKernel::shade(int p, const Hit& hit, const SampleBlock& block) {
+  PathState& path = path_[static_cast<size_t>(p)];
+  PathSample& sample = sample_[static_cast<size_t>(p)];
   if (observer_) observer_->onHit(hit);
   path.throughput *= mediaTransmittance(scene_, path.media, hit.distance);
   const MaterialSummary& material = context_.summaryOf(hit);
@@ -313,14 +338,10 @@ bool PathKernel::shade(PathState& path, const Hit& hit, const SampleBlock& block
   if (path.segments >= plan_.settings.maxDepth) return passPane(path, hit, bsdf.straightTransmittance());
 
   const bool twoSided = (lobes & kTransmittingLobes) != 0;
-  const bool asks = guide_ && path.segments <= kGuidedSegments && bsdf.hasNonDelta();
-  const GuidedBsdf guided = asks ? GuidedBsdf(bsdf, *guide_, hit) : GuidedBsdf(bsdf);
+  const bool asks = aids_.guide && path.segments <= kGuidedSegments && bsdf.hasNonDelta();
+  const GuidedBsdf guided = asks ? GuidedBsdf(bsdf, *aids_.guide, hit) : GuidedBsdf(bsdf);
   if (guided.guided()) ++guidedCount;
-  if (bsdf.hasNonDelta()) {
-    hasShadow = sampleLight(path, hit, guided, twoSided, block, shadow);
-    shadow.forFeatures = firstNonSpecular && path.featuresDone;
-    shadow.direct = path.bounces == 0;
-  }
+  if (bsdf.hasNonDelta()) sampleLights(p, hit, guided, twoSided, block, firstNonSpecular && path.featuresDone);
   return scatter(path, hit, guided, twoSided, block);
 }
 

@@ -25,6 +25,21 @@ struct ShadowRay {
   bool direct;            // of the first non-specular vertex
 };
 
+// The random numbers of one of `count` light samples of a vertex.
+struct LightChoice {
+  float select;
+  Vec2 place;
+  float count;
+};
+// The k-th: a lattice that the block's numbers shift, so that the samples differ in their lights and places.
+LightChoice lightChoice(const SampleBlock& block, int k = 0, int count = 1);
+
+// What is found out before the first pass about how paths are best sampled.
+struct PathAids {
+  const Guide* guide = nullptr;  // directions are sampled with it, too; null: by BSDFs alone
+  int lightSamples = 1;          // at the first surface that is no mirror
+};
+
 // Sees the steps of a path, for replay.
 class PathObserver {
  public:
@@ -61,8 +76,7 @@ class PathKernel {
   const PathSample& sample(int i) const { return sample_[static_cast<size_t>(i)]; }
   void clear() { count_ = 0; }
   void observe(PathObserver* observer) { observer_ = observer; }
-  // Directions are sampled with the guide, too; null: by BSDFs alone.
-  void guideBy(const Guide* guide) { guide_ = guide; }
+  void use(const PathAids& aids) { aids_ = aids; }
   // Every vertex is told to the recorder.
   void teach(PathRecorder* recorder) { recorder_ = recorder; }
 
@@ -79,9 +93,8 @@ class PathKernel {
   void traceShadows();
   // Hits and random numbers of all active paths whose rays hit something.
   void prepareShading();
-  // One step of a path from a hit; true when it goes on. At most one shadow ray is appended.
-  bool shade(PathState& path, const Hit& hit, const SampleBlock& block, PathSample& sample, ShadowRay& shadow,
-             bool& hasShadow);
+  // One step of a path from a hit; true when it goes on. Shadow rays are appended.
+  bool shade(int p, const Hit& hit, const SampleBlock& block);
   void addEnvironment(const PathState& path, PathSample& sample) const;
   void addEmission(const PathState& path, const Hit& hit, PathSample& sample) const;
   void addUnlit(PathState& path, const Hit& hit, PathSample& sample) const;
@@ -89,7 +102,9 @@ class PathKernel {
   bool crossNullInterface(PathState& path, const Hit& hit) const;
   bool passPane(PathState& path, const Hit& hit, const Spectrum& weight) const;
   bool sampleLight(const PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided,
-                   const SampleBlock& block, ShadowRay& shadow) const;
+                   const LightChoice& choice, ShadowRay& shadow) const;
+  void sampleLights(int p, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided, const SampleBlock& block,
+                    bool forFeatures);
   bool scatter(PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided, const SampleBlock& block) const;
   bool turn(PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const BsdfSample& sample) const;
   void recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsdf, PathSample& sample) const;
@@ -100,7 +115,7 @@ class PathKernel {
   const PassSampler& sampler_;
   std::vector<RecordedRay>* record_;
   PathObserver* observer_ = nullptr;
-  const Guide* guide_ = nullptr;
+  PathAids aids_;
   PathRecorder* recorder_ = nullptr;
   Roulette roulette_;
   bool wantFeatures_, filtered_;

@@ -27,6 +27,7 @@ struct PathState {
   bool lastTwoSided = false;
   Receiver lastReceiver() const { return {lastPosition, lastNormal, lastTwoSided, time}; }
   float lastPdfW = 0;
+  float lastLightSamples = 1;
   bool lightCouldNotBeSampled = true;  // camera, delta scattering, or a null interface crossed since
 
   float rouletteScale = 1;    // undoes in Russian roulette the radiance compression of refraction, and the guide

@@ -46,7 +46,7 @@ PixelWindow windowOf(const PixelWindow& window, size_t tile) {
 }  // namespace
 
 bool renderPlacedTiles(const Integrator& integrator, const PassRequest& request, PassTarget& target,
-                       const Guide* guide) {
+                       const PathAids& aids) {
   Samplers samplers;
   const std::vector<Group> groups = groupsOf(integrator, request, samplers);
   std::atomic<bool> cancelled{false};
@@ -56,7 +56,7 @@ bool renderPlacedTiles(const Integrator& integrator, const PassRequest& request,
       return;
     }
     PathKernel kernel(request.context, request.plan, *groups[g].sampler, nullptr, integrator.roulette());
-    kernel.guideBy(guide);
+    kernel.use(aids);
     uint64_t paths = 0, before = 0;
     for (const size_t t : groups[g].tiles) {
       const PixelWindow tile = windowOf(request.plan.window, t);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Path tracing: one camera path per pixel and pass, random numbers of its own for every pixel.
-#include "integrators/guide_preparation.h"
 #include "integrators/light_preparation.h"
-#include "integrators/path_kernel.h"
+#include "integrators/path_preparation.h"
 #include "integrators/registry.h"
 #include "integrators/tiles.h"
 
@@ -28,13 +27,14 @@ class PathTracer final : public Integrator {
   bool placesSamples() const override { return true; }
 
   std::shared_ptr<const Preparation> prepare(const TransportContext& context, const Plan& plan) const override {
-    return guidingApplies(plan).yes ? std::make_shared<GuidePreparation>(context, plan) : nullptr;
+    return std::make_shared<PathPreparation>(context, plan);
   }
-  std::optional<PlanLine> planLine(const Plan& plan) const override {
-    const Applies applies = guidingApplies(plan);
-    return PlanLine{applies.yes, "path guiding",
-                    applies.yes && applies.reason.empty() ? "learned before the first pass, and used where it pays"
-                                                          : applies.reason};
+  std::vector<PlanLine> planLines(const Plan& plan) const override {
+    const Applies guiding = guidingApplies(plan), samples = lightSamplesMeasured(plan);
+    return {{guiding.yes, "path guiding",
+             guiding.yes && guiding.reason.empty() ? "learned before the first pass, and used where it pays"
+                                                   : guiding.reason},
+            {samples.yes || plan.settings.lightSamples > 0, "light samples", samples.reason}};
   }
   WorkingMemory workingMemory(const Plan& plan) const override {
     if (!guidingApplies(plan).yes) return {};
@@ -46,8 +46,7 @@ class PathTracer final : public Integrator {
   }
 
   bool renderPass(const PassRequest& request, PassTarget& target) const override {
-    if (!guidingApplies(request.plan).yes) return renderCameraPaths(*this, request, target);
-    return renderCameraPaths(*this, request, target, GuidePreparation::Ref(request)->guide());
+    return renderCameraPaths(*this, request, target, PathPreparation::Ref(request)->aids());
   }
 };
 

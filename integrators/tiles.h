@@ -97,18 +97,18 @@ inline void renderTile(const Integrator& integrator, const PassRequest& request,
 
 // The same of the tiles that request.tiles names.
 bool renderPlacedTiles(const Integrator& integrator, const PassRequest& request, PassTarget& target,
-                       const Guide* guide);
+                       const PathAids& aids);
 
 // A pass of one camera path for every pixel, followed by the path kernel with the integrator's random numbers and
-// roulette, and with the guide if there is one. Returns false when cancelled.
+// roulette. Returns false when cancelled.
 inline bool renderCameraPaths(const Integrator& integrator, const PassRequest& request, PassTarget& target,
-                              const Guide* guide = nullptr) {
-  if (request.tiles) return renderPlacedTiles(integrator, request, target, guide);
+                              const PathAids& aids = {}) {
+  if (request.tiles) return renderPlacedTiles(integrator, request, target, aids);
   const Plan& plan = request.plan;
   const std::unique_ptr<PassSampler> sampler = integrator.pixelSampler(plan, request.pass);
   return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>* record) {
     PathKernel kernel(request.context, plan, *sampler, record, integrator.roulette());
-    kernel.guideBy(guide);
+    kernel.use(aids);
     renderTile(integrator, request, *sampler, tile, kernel, target);
     return TileCounts{pixelCount(tile), kernel.rayCount, kernel.shadowRayCount};
   });

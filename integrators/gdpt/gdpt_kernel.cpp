@@ -256,7 +256,8 @@ bool GradientKernel::shadeBase(BasePath& base, ShadowRay& shadow) {
     leaveBase(base, bsdf, twoSided, block);
     return false;
   }
-  const bool lit = bsdf.hasNonDelta() && sampleLight(walker.path, walker.hit, bsdf, twoSided, block, shadow);
+  const bool lit =
+      bsdf.hasNonDelta() && sampleLight(walker.path, walker.hit, bsdf, twoSided, lightChoice(block), shadow);
   bool hasShadow = lit;
   if (lit) vertex.light = walker.prefix * shadow.contribution;
   for (ShiftedPath& shift : base.shift) {
@@ -265,7 +266,7 @@ bool GradientKernel::shadeBase(BasePath& base, ShadowRay& shadow) {
       shift.light = w.prefix * shadow.contribution;
     if (shift.state != Shift::Connected) continue;
     ShadowRay seen;
-    if (!sampleLight(w.path, w.hit, bsdfOf(w.surface, w.hit), twoSided, block, seen)) continue;
+    if (!sampleLight(w.path, w.hit, bsdfOf(w.surface, w.hit), twoSided, lightChoice(block), seen)) continue;
     shift.light = w.prefix * seen.contribution;
     if (!hasShadow) shadow = seen;
     hasShadow = true;

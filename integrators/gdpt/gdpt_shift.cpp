@@ -110,7 +110,7 @@ bool GradientKernel::shadeShift(BasePath& base, int j, ShadowRay& shadow, RayQue
   const SampleBlock block = sampler_.block(w.path.key, w.path.block());
   const bool twoSided = transmits(w.surface);
   const bool lit = w.path.segments < plan_.settings.maxDepth && bsdf.hasNonDelta() &&
-                   sampleLight(w.path, w.hit, bsdf, twoSided, block, shadow);
+                   sampleLight(w.path, w.hit, bsdf, twoSided, lightChoice(block), shadow);
   if (lit) shift.light = w.prefix * shadow.contribution;
   if (!vertex.goesOn) return lit;
   shift.canReconnect = vertex.rough && w.rough && vertex.nullCrossings == w.path.nullCrossings &&

@@ -34,7 +34,7 @@ struct PassStatistics {
 struct Preparation {
   virtual ~Preparation() = default;
   // What was decided on the way, and why.
-  virtual std::optional<PlanLine> decision() const { return std::nullopt; }
+  virtual std::vector<PlanLine> decisions() const { return {}; }
 };
 
 // A pass that renders some tiles of the window only (SamplePlacement), and what that took.
@@ -89,7 +89,7 @@ class Integrator {
   // Share of the light in view that it cannot find, however long it renders.
   virtual double misses(const LightReach&) const { return 0; }
   // What prepare() will decide, or why it need not.
-  virtual std::optional<PlanLine> planLine(const Plan&) const { return std::nullopt; }
+  virtual std::vector<PlanLine> planLines(const Plan&) const { return {}; }
   // Of one pass with this plan's window and settings.
   virtual WorkingMemory workingMemory(const Plan&) const { return {}; }
   // Renders pass `request.pass` of the plan's window into the target. Returns false when cancelled.

@@ -56,6 +56,7 @@ std::vector<StateOption> pixelOptions(const Plan& plan) {
       {"--max-depth", std::to_string(s.maxDepth)},
       {"--lights", toString(s.lightStrategy)},
       {"--guiding", toString(s.guiding)},
+      {"--light-samples", s.lightSamples > 0 ? std::to_string(s.lightSamples) : "auto"},
       {"--clamp", fmt::format("{}", s.clamp)},
       {"--background",
        s.background ? fmt::format("{},{},{}", s.background->x, s.background->y, s.background->z) : "none"},

@@ -294,7 +294,7 @@ Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& sett
   requireShadowAlpha(scene, settings);
   planIntegrators(scene, plan.settings, available, plan);
   for (const PlannedIntegrator& p : plan.integrators)
-    if (const auto line = p.integrator->planLine(plan)) plan.lines.push_back(*line);
+    for (PlanLine& line : p.integrator->planLines(plan)) plan.lines.push_back(std::move(line));
   planSceneParts(scene, settings, plan);
   planMotion(scene, plan);
   planView(scene, plan);
@@ -322,7 +322,7 @@ uint64_t Plan::hash() const {
   h.add(fmt::format("{} {} {} {} {} {} {} {}", settings.width, settings.height, settings.maxDepth, settings.seed,
                     static_cast<int>(settings.sampler), toString(settings.filter), settings.clamp,
                     settings.transparent));
-  h.add(fmt::format("{}", static_cast<int>(settings.guiding)));
+  h.add(fmt::format("{} {}", static_cast<int>(settings.guiding), settings.lightSamples));
   h.add(fmt::format("{} {} {} {}", settings.photons, settings.photonRadius, settings.photonDirect,
                     settings.photonAiming));
   return h.value();

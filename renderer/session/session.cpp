@@ -57,7 +57,7 @@ class Session::Loop {
                   [&] { preparations_[i] = plan_.integrators[i].integrator->prepare(session_.context_, plan_); });
       film_.estimates[i].seconds += preparing.seconds();
       if (preparations_[i])
-        if (auto decision = preparations_[i]->decision()) result_.decisions.push_back(std::move(*decision));
+        for (PlanLine& line : preparations_[i]->decisions()) result_.decisions.push_back(std::move(line));
     }
     recordDecisions();
   }

@@ -18,6 +18,8 @@ enum class PixelFilter { Box, Gaussian, BlackmanHarris };
 // Whether camera paths learn where light comes from; automatic: where that pays.
 enum class Guiding { Automatic, On, Off };
 
+inline constexpr int kMostLightSamples = 64;
+
 struct Settings {
   int width = 1280, height = 720;  // full frame, pixels
   std::optional<PixelWindow> crop;
@@ -31,6 +33,7 @@ struct Settings {
   PixelFilter filter = PixelFilter::Box;
   LightStrategy lightStrategy = LightStrategy::Automatic;
   Guiding guiding = Guiding::Automatic;
+  int lightSamples = 0;  // of a camera path of pt at its first surface that is no mirror; 0: as many as pay
   KeptBuffers keep{.features = true};
   bool transparent = false;            // camera rays that miss: no radiance, alpha 0
   std::optional<Spectrum> background;  // what camera rays that miss see instead of the environment

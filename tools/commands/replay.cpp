@@ -4,7 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "integrators/guide_preparation.h"
+#include "integrators/path_preparation.h"
 #include "integrators/path_kernel.h"
 #include "integrators/registry.h"
 #include "integrators/bidirectional/strategies.h"
@@ -150,7 +150,7 @@ int runReplay(const ReplayOptions& o) {
   PathKernel kernel(context, plan, *sampler, nullptr, integrator.roulette());
   kernel.observe(&observer);
   const auto preparation = integrator.prepare(context, plan);
-  if (const auto* guided = dynamic_cast<const GuidePreparation*>(preparation.get())) kernel.guideBy(guided->guide());
+  if (const auto* paths = dynamic_cast<const PathPreparation*>(preparation.get())) kernel.use(paths->aids());
   fmt::print("{} pass {} pixel {},{} of {}x{}\n", integrator.name(), o.pass, x, y, settings.width, settings.height);
   kernel.start(x, y, integrator.pixelKey(*sampler, plan, x, y));
   kernel.run();

@@ -170,6 +170,9 @@ void addSampleOptions(CLI::App& command, SampleChoice& c) {
            "How lights are chosen: auto, power or hierarchy");
   addNamed(command, "--guiding", c.guiding, {"guiding", kGuidings},
            "Whether pt learns where light comes from: auto (where it pays), on or off");
+  command.add_option("--light-samples", c.lightSamples, "Lights that a path of pt samples at its first surface")
+      ->default_str("as many as pay")
+      ->check(wholeNumber(1, kMostLightSamples));
   addThreads(command, c.threads);
   command.add_option("--clamp", c.clamp, "Clamp a path's radiance (biased; 0: off)")
       ->capture_default_str()
@@ -199,6 +202,7 @@ Settings makeSettings(const SceneChoice& scene, const SampleChoice& samples) {
   s.filter = samples.filter;
   s.lightStrategy = samples.lights;
   s.guiding = samples.guiding;
+  s.lightSamples = samples.lightSamples;
   s.threads = samples.threads;
   s.clamp = static_cast<float>(samples.clamp);
   s.photons = samples.photons;

@@ -48,8 +48,9 @@ struct SampleChoice {
   PixelFilter filter = PixelFilter::Box;
   LightStrategy lights = LightStrategy::Automatic;
   Guiding guiding = Guiding::Automatic;
-  double seconds = 0;  // of --time, 0: none
-  uint64_t spp = 0;    // 0: not said
+  int lightSamples = 0;  // 0: as many as pay
+  double seconds = 0;    // of --time, 0: none
+  uint64_t spp = 0;      // 0: not said
   int maxDepth = 32;
   uint64_t seed = 0;
   int threads = 0;

@@ -146,9 +146,9 @@ TEST_CASE("guided paths: light round a corner has less variance, and the decisio
   const Scene scene(roomWithScreen());
   const Settings settings = settingsOf("pt", 160, 104, 8);
   const auto automatic = prepared(scene, settings);
-  REQUIRE(automatic->decision().has_value());
-  INFO(automatic->decision()->reason);
-  CHECK(automatic->decision()->kept);
+  REQUIRE(automatic->decisions().size() == 1);
+  INFO(automatic->decisions()[0].reason);
+  CHECK(automatic->decisions()[0].kept);
   REQUIRE(automatic->guide() != nullptr);
   CHECK(automatic->guide()->bytes() < guidingBytes(makePlan(scene, scene.data().cameras[0], settings, integrators())));
   double variance[2] = {0, 0};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "integrators/guide_photons.h"
+#include "integrators/guiding/guide_photons.h"
 
 #include "renderer/core/parallel.h"
 #include "renderer/transport/light_emission.h"
