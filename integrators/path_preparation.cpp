@@ -22,9 +22,9 @@ constexpr uint64_t kPixelsOfPlace = 192, kMostPlaces = 2048;
 // light samples need not do.
 constexpr uint64_t kPasses = 16 * kSequenceBuckets;
 constexpr int kTried = 4;  // light samples of the paths that are held against those with one
-constexpr double kPays = 1.1;
+constexpr double kPays = 1.2;
 // Of a light sample with its shadow ray, in rays of paths with their shading.
-constexpr double kLightSampleCost = 1.5;
+constexpr double kLightSampleCost = 1.2;
 // What counts as the brightness of a black place: this share of the mean.
 constexpr double kDarkest = 0.1;
 // Means above this many times their place's brightness count as that.

@@ -94,7 +94,7 @@ TEST_CASE("light samples: numbers lie in [0, 1) and are spread") {
 
 TEST_CASE("light samples: as many as the shares of variance and cost ask for") {
   CHECK(lightSamplesThatPay({0, 0.1}) == 1);
-  CHECK(lightSamplesThatPay({0.3, 0.2}) == 1);  // they gain, but too little to be believed
+  CHECK(lightSamplesThatPay({0.5, 0.2}) == 1);  // they gain, but too little to be believed
   CHECK(lightSamplesThatPay({0.8, 0.25}) == 3);
   CHECK(lightSamplesThatPay({1, 0}) == 4);
   CHECK(lightSampleGain({0.6, 0.2}, 2) == doctest::Approx(1 / (0.7 * 1.2)));
