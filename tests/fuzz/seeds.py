@@ -109,6 +109,8 @@ def every_feature():
         "extensions": {"KHR_materials_variants": {"mappings": [
             {"material": 1, "variants": [0]}]}}}
     strip = {"attributes": {"POSITION": 8}, "mode": 5, "material": 1}
+    strokes = [{"attributes": {"POSITION": 0, "COLOR_0": 5}, "mode": mode}
+               for mode in range(4)]
     nodes = [
         {"mesh": 0, "skin": 0, "weights": [0.5], "children": [1, 2]},
         {"camera": 0, "translation": [0, 0, 3]},
@@ -123,7 +125,7 @@ def every_feature():
         "scenes": [{"nodes": [0, 3, 4], "extensions": {
             "EXT_lights_image_based": {"light": 0}}}], "nodes": nodes,
         "meshes": [{"primitives": [primitive], "weights": [0.1]},
-                   {"primitives": [strip]}],
+                   {"primitives": [strip, *strokes]}],
         "skins": [{"joints": [2], "inverseBindMatrices": 3}],
         "animations": [{"samplers": [{"input": 6, "output": 7,
                                       "interpolation": "LINEAR"}],
