@@ -109,6 +109,8 @@ def every_feature():
         "extensions": {"KHR_materials_variants": {"mappings": [
             {"material": 1, "variants": [0]}]}}}
     strip = {"attributes": {"POSITION": 8}, "mode": 5, "material": 1}
+    strokes = [{"attributes": {"POSITION": 0, "COLOR_0": 5}, "mode": mode}
+               for mode in range(4)]
     nodes = [
         {"mesh": 0, "skin": 0, "weights": [0.5], "children": [1, 2]},
         {"camera": 0, "translation": [0, 0, 3]},
@@ -120,9 +122,10 @@ def every_feature():
         {"matrix": [float(i % 5 == 0) for i in range(16)], "camera": 1}]
     document = {
         "asset": {"version": "2.0"}, "scene": 0,
-        "scenes": [{"nodes": [0, 3, 4]}], "nodes": nodes,
+        "scenes": [{"nodes": [0, 3, 4], "extensions": {
+            "EXT_lights_image_based": {"light": 0}}}], "nodes": nodes,
         "meshes": [{"primitives": [primitive], "weights": [0.1]},
-                   {"primitives": [strip]}],
+                   {"primitives": [strip, *strokes]}],
         "skins": [{"joints": [2], "inverseBindMatrices": 3}],
         "animations": [{"samplers": [{"input": 6, "output": 7,
                                       "interpolation": "LINEAR"}],
@@ -139,12 +142,17 @@ def every_feature():
         "accessors": accessors, "bufferViews": views,
         "buffers": [{"byteLength": len(binary)}],
         "extensions": {
+            "EXT_lights_image_based": {"lights": [{
+                "intensity": 2, "rotation": [0, 0, 0, 1],
+                "irradianceCoefficients": [[1, 0.5, 0.2]] * 9,
+                "specularImages": [[0] * 6], "specularImageSize": 2}]},
             "KHR_lights_punctual": {"lights": [
                 {"type": "spot", "intensity": 10, "range": 9,
                  "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.4}},
                 {"type": "point"}, {"type": "directional"}]},
             "KHR_materials_variants": {"variants": [{"name": "red"}]}},
-        "extensionsUsed": ["KHR_lights_punctual", "KHR_node_visibility"]}
+        "extensionsUsed": ["EXT_lights_image_based", "KHR_lights_punctual",
+                           "KHR_node_visibility"]}
     return json.dumps(document, separators=(",", ":")).encode() + b"\0" \
         + binary
 

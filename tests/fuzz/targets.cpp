@@ -109,6 +109,7 @@ void gltf(Input input) {
   write(path, glb.data(), glb.size());
   LoadOptions options;
   options.frameTime = 0.5f;
+  options.pointRadius = 0.1f;
   options.ignoredExtensions = {"ACME_gizmo"};
   // What is left of a broken scene is rendered; the strict way must end in a message or in the same scene.
   expectingErrors([&] {

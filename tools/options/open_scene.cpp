@@ -50,6 +50,7 @@ double depthAt(const Scene& scene, const CameraData& data, const SceneChoice& c,
 LoadOptions loadOptions(const SceneChoice& c) {
   LoadOptions options = c.load;
   options.defaultLight = c.environment.empty() ? c.defaultLight : DefaultLight::None;
+  options.imageBasedLight = c.environment.empty();
   options.keepAllAttributes = c.full;
   options.camera = c.lookAt ? "none" : c.camera;
   if (c.frameScene >= 0) options.scene = c.frameScene;
@@ -101,6 +102,10 @@ SceneData SceneOpener::load(double frameTime) {
     data.environment = e;
   } else if (data.environment) {
     data.environment->radiance *= scale;
+    if (data.environment->ofFile) {
+      data.environment->radiance *= static_cast<float>(c.environmentScale);
+      data.environment->rotation = glm::radians(static_cast<float>(c.environmentRotation));
+    }
     if (data.backdrop) *data.backdrop *= scale;
   }
   for (Material& m : data.materials) m.emission *= scale;

@@ -96,6 +96,10 @@ void addLoadOptions(CLI::App& command, SceneChoice& c) {
                   "Render although the file requires this unknown extension (repeatable)")
       ->allow_extra_args(false)
       ->type_name("NAME");
+  command
+      .add_option("--point-radius", c.load.pointRadius,
+                  "Draw points and lines as spheres and rods of this radius in metres (default: they are left out)")
+      ->check(number(1e-12, 1e9));
   command.add_flag("--double-sided", c.load.doubleSided, "Treat every material as double-sided");
   addNamed(
       command, "--multi-scatter", c.load.multiScatter, {"choice", kOnOff},

@@ -38,6 +38,7 @@ std::vector<StateOption> sceneIdentity(const SceneChoice& c, const SceneData& da
           {"--frame-time", fmt::format("{}", c.frameTime)},
           {"--shutter", fmt::format("{}", c.load.shutter)},
           {"--animation", c.load.animation},
+          {"--point-radius", fmt::format("{}", c.load.pointRadius)},
           {"--double-sided", yesOrNo(c.load.doubleSided)},
           {"--multi-scatter", yesOrNo(c.load.multiScatter)},
           {"--default-light", toString(c.defaultLight)},

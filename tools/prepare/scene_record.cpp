@@ -31,6 +31,7 @@ nlohmann::json sceneRecord(const Scene& scene) {
                       {"type", l.kind == PunctualKind::Point  ? "point"
                                : l.kind == PunctualKind::Spot ? "spot"
                                                               : "directional"}});
+  if (data.environment && data.environment->ofFile) lights.push_back({{"name", ""}, {"type", "image-based"}});
   // An emitter, for people, is an emissive material in use.
   std::set<uint32_t> emitters;
   for (const EmissiveTriangle& e : scene.emitters()) emitters.insert(data.meshes[e.mesh].material);

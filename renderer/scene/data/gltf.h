@@ -21,6 +21,8 @@ struct LoadOptions {
   std::string animation;           // the clip that frameTime is in, by name or index; empty: the first
   std::string camera;              // name or index of the camera that will look; empty: the first, "none": none
   DefaultLight defaultLight = DefaultLight::Studio;  // what a file without any light or emitter gets
+  bool imageBasedLight = true;                       // false: that of the scene gives way to another environment
+  float pointRadius = 0;                             // of points and lines, metres in the world; 0: they are not drawn
   bool multiScatter = true;                          // Material::multiScatter of all materials
   bool doubleSided = false;                          // treat every material as double-sided
   bool allowExternal = false;                        // files may lie outside of the folder of the scene

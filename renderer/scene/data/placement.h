@@ -21,6 +21,13 @@ glm::mat<3, 3, T> cofactors(const glm::mat<3, 3, T>& m) {
   return {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1])};
 }
 
+inline Vec3 normalizedOr(const Vec3& v, const Vec3& fallback) {
+  // In double: the square of a small or large float is out of range.
+  const glm::dvec3 d(v);
+  const double length = glm::length(d);
+  return length > 1e-6 && length < 1e18 ? Vec3(d / length) : fallback;
+}
+
 // The axes of a camera or light: one that is flattened away is made from the two others.
 glm::dmat3 axesOf(const glm::dmat4& transform);
 

@@ -91,6 +91,7 @@ struct EnvironmentData {
   float rotation = 0;                  // radians about +Y
   // Radiance of the image that light sampling leaves, but for a twentieth, to the directions that surfaces choose.
   float base = 0;
+  bool ofFile = false;  // an image-based light of the file, no choice of who renders it
 };
 
 // What lights a file that has no light of its own.

@@ -36,6 +36,7 @@ void addDefaults(SceneData& scene, const LoadOptions& options, Report& report) {
 SceneData describe(const Document& document) {
   SceneData scene;
   scene.file = document.path;
+  scene.environment = document.environment;
   scene.extensionsUsed = document.model.extensionsUsed;
   scene.extensionsRequired = document.model.extensionsRequired;
   scene.extensionsIgnored = document.extensionsIgnored;
@@ -88,6 +89,7 @@ SceneFile::SceneFile(const std::string& path, const LoadOptions& options, const 
   readCamerasAndLights(document);
   resolvePointers(document);
   validate(document);
+  readImageBasedLight(document);
   opened_->log = log;
   opened_->nodes = document.model.nodes;
   opened_->materials = document.materials;

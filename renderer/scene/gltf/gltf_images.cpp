@@ -72,7 +72,8 @@ ImageTable::ImageTable(Document& document, const std::set<int>& textures) : docu
       wanted[images[choice]] |= choice + 1 < images.size();
       ++texture;
     }
-    for (const int image : decode(wanted, budget)) report(image, wanted.at(image));
+    for (const int image : decode(wanted, budget))
+      report(image, wanted.at(image) ? "the texture's other image is used" : "factors alone are used");
     std::erase_if(without, [&](int texture) { return of(texture) != nullptr; });
   }
 }
@@ -81,6 +82,16 @@ const DecodedImage* ImageTable::of(int texture) const {
   for (const int image : imagesOf(document_.model.textures[static_cast<size_t>(texture)]))
     if (first_.contains(key(image)) && at(image).image) return &at(image);
   return nullptr;
+}
+
+std::vector<std::shared_ptr<const Image>> ImageTable::read(const std::vector<int>& images, const char* meanwhile) {
+  std::map<int, bool> wanted;
+  for (const int image : images) wanted[image] = false;
+  PixelBudget budget(document_.sourceBytes);
+  for (const int image : decode(wanted, budget)) report(image, meanwhile);
+  std::vector<std::shared_ptr<const Image>> pixels;
+  for (const int image : images) pixels.push_back(at(image).image);
+  return pixels;
 }
 
 ImageTable::Key ImageTable::key(int image) const {
@@ -104,10 +115,9 @@ std::vector<int> ImageTable::decode(const std::map<int, bool>& images, PixelBudg
   return unique;
 }
 
-void ImageTable::report(int image, bool hasOther) {
+void ImageTable::report(int image, const char* meanwhile) {
   const DecodedImage& item = at(image);
   const std::string place = "/images/" + std::to_string(image);
-  const char* meanwhile = hasOther ? "the texture's other image is used" : "factors alone are used";
   if (!item.problem.empty()) document_.report.problem(place, item.problem, meanwhile);
   if (!item.note.empty()) document_.report.problem(place, item.note, "that file is read");
   if (!item.image) return;

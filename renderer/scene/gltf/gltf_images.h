@@ -27,6 +27,9 @@ class ImageTable {
   // Null where a texture has no image that can be decoded: its factor stays alone.
   const DecodedImage* of(int texture) const;
 
+  // Images that no texture needs, decoded in parallel; null where one cannot be, which is reported with `meanwhile`.
+  std::vector<std::shared_ptr<const Image>> read(const std::vector<int>& images, const char* meanwhile);
+
  private:
   using Key = std::pair<std::string_view, int>;  // two entries for one file or view share its pixels
 
@@ -34,7 +37,7 @@ class ImageTable {
   const DecodedImage& at(int image) const { return document_.decoded[static_cast<size_t>(first_.at(key(image)))]; }
   // Those that no other entry of the same pixels was decoded for.
   std::vector<int> decode(const std::map<int, bool>& images, PixelBudget& budget);
-  void report(int image, bool hasOther);
+  void report(int image, const char* meanwhile);
 
   Document& document_;
   std::map<Key, int> first_;

@@ -6,6 +6,7 @@
 
 #include "renderer/scene/gltf/document/gltf_accessor.h"
 #include "renderer/scene/gltf/mesh_repair.h"
+#include "renderer/scene/gltf/poses/skinning.h"
 #include "renderer/scene/data/placement.h"
 #include "renderer/scene/gltf/tangents.h"
 
@@ -20,14 +21,15 @@ class MeshBuilder {
 
   TriangleMesh build() {
     if (!open()) return {};
-    readTriangles();
+    readIndices();
+    if (!isRound()) readTriangles();
     selectVertices();
     mesh_.positions = morphed<Vec3>("POSITION");
     if (mesh_.positions.size() != vertices_) {
       report_.problem(job_.place, "holds positions that are no points; compress the file again", "it is left out");
       return {};
     }
-    mesh_.normals = morphed<Vec3>("NORMAL");
+    if (!isRound()) mesh_.normals = morphed<Vec3>("NORMAL");
     // Supplied tangents belong to supplied normals; without those they are to be ignored.
     if (!mesh_.normals.empty() && wantsTangents()) readTangents();
     readUvs();
@@ -39,6 +41,7 @@ class MeshBuilder {
         skin<double>();  // floats would lose what is left of sums of large numbers
       }
     }
+    if (isRound()) thicken();
     if (!dropBadTriangles(mesh_, report_, job_.place)) return {};
     compactVertices(mesh_, extras_);
     repairNormals(mesh_, report_, job_.place);
@@ -50,15 +53,15 @@ class MeshBuilder {
   }
 
  private:
-  bool wantsTangents() const { return job_.needsTangents || job_.keepAllAttributes; }
+  bool isRound() const { return primitive_.mode < 4; }
+  bool wantsTangents() const { return !isRound() && (job_.needsTangents || job_.keepAllAttributes); }
 
   // What cannot be drawn at all has no mesh; its flaw was reported.
   bool open() {
     if (primitive_.mode < 0 || primitive_.indices < -1) return false;
-    if (primitive_.mode < 4) {
-      report_.warn(job_.place, "points and lines are not drawn");
-      return false;
-    }
+    if (isRound() && !(job_.round.radius > 0))
+      report_.warn(job_.place, "points and lines are not drawn; --point-radius METRES makes them spheres and rods");
+    if (isRound() && !canBeRound()) return false;
     const auto position = primitive_.attributes.find("POSITION");
     if (position == primitive_.attributes.end()) return false;
     vertices_ = fileVertices_ = document_.accessor(position->second).count;
@@ -138,16 +141,19 @@ class MeshBuilder {
     return asVectors<Vector>(base);
   }
 
-  void readTriangles() {
-    std::vector<uint32_t> indices;
+  void readIndices() {
     if (draco_) {
-      indices = std::move(draco_->indices);
+      indices_ = std::move(draco_->indices);
     } else if (primitive_.indices >= 0) {
-      indices = readIntegers(document_, primitive_.indices);
+      indices_ = readIntegers(document_, primitive_.indices);
     } else {
-      indices.resize(vertices_);
-      for (size_t i = 0; i < indices.size(); ++i) indices[i] = static_cast<uint32_t>(i);
+      indices_.resize(vertices_);
+      for (size_t i = 0; i < indices_.size(); ++i) indices_[i] = static_cast<uint32_t>(i);
     }
+  }
+
+  void readTriangles() {
+    const std::vector<uint32_t> indices = std::move(indices_);
     // A compressed strip comes out of its decoder as a list.
     if (primitive_.mode == 4 || draco_) {
       if (indices.size() % 3 != 0)
@@ -161,6 +167,20 @@ class MeshBuilder {
     // Validation reported the indices of vertices that do not exist: only their triangles are lost.
     std::erase_if(mesh_.triangles,
                   [&](const glm::uvec3& t) { return t.x >= vertices_ || t.y >= vertices_ || t.z >= vertices_; });
+  }
+
+  bool canBeRound() const {
+    if (!(job_.round.radius > 0)) return false;
+    if (shapeOf(glm::dmat4(job_.round.toWorld)) == Shape::Solid) return true;
+    report_.warn(job_.place, "points and lines that a scale of 0 makes flat are left out");
+    return false;
+  }
+
+  void thicken() {
+    uint64_t lost = 0;
+    const Strokes strokes = strokesOf(primitive_.mode, indices_, mesh_.positions, lost);
+    if (lost > 0) report_.warn(job_.place, "a point that does not exist or is not finite is dropped", lost);
+    mesh_ = roundMesh(mesh_, strokes, job_.round);
   }
 
   // Many primitives may each use a small part of one large set of vertices: only that part is read.
@@ -221,64 +241,21 @@ class MeshBuilder {
   }
 
   template <class T>
-  using Matrix = glm::mat<4, 4, T>;
-
-  template <class T>
   void skin() {
-    std::vector<Matrix<T>> joints;
-    for (glm::dmat4 joint : *job_.joints) {
-      for (int c = 0; c < 4; ++c) joint[c] -= glm::dvec4(job_.origin * joint[c].w, 0);
-      joints.emplace_back(joint);
-    }
-    const auto first = std::find_if(joints.begin(), joints.end(), [](const Matrix<T>& j) { return j[3][3] != 0; });
-    const Matrix<T> atRest = first == joints.end() ? Matrix<T>(1) : *first;
-    std::vector<Matrix<T>> blended(vertices_, Matrix<T>(0));
-    std::vector<float> total(vertices_, 0.0f);
-    for (int set = 0; has("JOINTS_" + std::to_string(set)); ++set)
-      addInfluences(std::to_string(set), joints, blended, total);
-    uint64_t unweighted = 0;
-    for (size_t v = 0; v < vertices_; ++v) {
-      if (!(total[v] > 1e-6f)) {
-        ++unweighted;
-        blended[v] = atRest;
-        total[v] = 1;
+    Skinning<T> skinning(*job_.joints, job_.origin, vertices_);
+    for (int k = 0; has("JOINTS_" + std::to_string(k)); ++k) {
+      uint32_t jointWidth = 0, weightWidth = 0;
+      const std::vector<float> joints = values("JOINTS_" + std::to_string(k), jointWidth),
+                               weights = values("WEIGHTS_" + std::to_string(k), weightWidth);
+      if (jointWidth == 4 && weightWidth == 4) {
+        skinning.add(joints, weights);
+      } else {
+        report_.warn(job_.place, "JOINTS and WEIGHTS do not match; they are ignored");
       }
-      transformVertex<T>(v, blended[v] * (1 / static_cast<T>(total[v])));
     }
+    const uint64_t unweighted = skinning.apply(mesh_);
     if (unweighted > 0)
       report_.warn(job_.place, "a skinned vertex has no weights; it follows the first joint", unweighted);
-  }
-
-  template <class T>
-  void addInfluences(const std::string& set, const std::vector<Matrix<T>>& moves, std::vector<Matrix<T>>& blended,
-                     std::vector<float>& total) {
-    uint32_t jointWidth = 0, weightWidth = 0;
-    const std::vector<float> joints = values("JOINTS_" + set, jointWidth),
-                             weights = values("WEIGHTS_" + set, weightWidth);
-    if (jointWidth != 4 || weightWidth != 4) {
-      report_.warn(job_.place, "JOINTS and WEIGHTS do not match; they are ignored");
-      return;
-    }
-    for (size_t i = 0; i < vertices_ * 4; ++i) {
-      if (!(weights[i] > 0) || !std::isfinite(weights[i])) continue;
-      if (!(joints[i] >= 0 && joints[i] < 1e9f)) continue;
-      const auto joint = static_cast<size_t>(joints[i]);
-      if (joint >= moves.size() || moves[joint][3][3] == 0) continue;
-      blended[i / 4] += moves[joint] * static_cast<T>(weights[i]);
-      total[i / 4] += weights[i];
-    }
-  }
-
-  template <class T>
-  void transformVertex(size_t v, const Matrix<T>& m) {
-    mesh_.positions[v] = Vec3(m * glm::vec<4, T>(glm::vec<3, T>(mesh_.positions[v]), 1));
-    const glm::mat3 linear(m);
-    if (!mesh_.normals.empty()) {
-      const glm::mat3 normalMatrix = cofactors(linear);
-      const float side = glm::dot(linear[0], normalMatrix[0]) < 0 ? -1.0f : 1.0f;
-      mesh_.normals[v] = normalizedOr(side * (normalMatrix * mesh_.normals[v]), Vec3(0));
-    }
-    if (!mesh_.tangents.empty()) mesh_.tangents[v] = Vec4(linear * Vec3(mesh_.tangents[v]), mesh_.tangents[v].w);
   }
 
   void finishTangents() {
@@ -316,8 +293,9 @@ class MeshBuilder {
   const Primitive& primitive_;
   Report& report_;
   std::optional<DracoMesh> draco_;
-  uint64_t fileVertices_ = 0;       // of the accessors
-  uint64_t vertices_ = 0;           // read
+  uint64_t fileVertices_ = 0;  // of the accessors
+  uint64_t vertices_ = 0;      // read
+  std::vector<uint32_t> indices_;
   std::vector<uint32_t> selected_;  // which ones, ascending; empty: all
   TriangleMesh mesh_;
   std::array<uint32_t, kUvSlots> slotSet_{kNone, kNone, kNone, kNone};  // the uv set that each slot holds
@@ -335,6 +313,33 @@ TriangleMesh buildMesh(const Document& document, const MeshJob& job, Report& rep
     report.problem(job.place, "needs more memory than there is; compress the file again", "it is left out");
     return {};
   }
+}
+
+int roundLevel(const Document& document, const std::vector<MeshJob>& jobs) {
+  constexpr uint64_t kFew = uint64_t(1) << 23, kMost = uint64_t(1) << 25;
+  // A few bytes of JSON may claim any number.
+  const uint64_t most = std::min(kMost, (uint64_t(1) << 20) + 64 * document.sourceBytes);
+  uint64_t points = 0, segments = 0;
+  for (const MeshJob& job : jobs) {
+    const Primitive& primitive = *job.primitive;
+    const auto position = primitive.attributes.find("POSITION");
+    if (primitive.mode < 0 || primitive.mode > 3 || position == primitive.attributes.end() || !(job.round.radius > 0))
+      continue;
+    const int counted = primitive.indices >= 0 ? primitive.indices : position->second;
+    const uint64_t count = std::min(document.accessor(counted).count, size_t(1) << 40) * (1 + job.later.size());
+    (primitive.mode == 0 ? points : segments) += primitive.mode == 1 ? count / 2 : count;
+    if (points + segments > most) break;
+  }
+  const auto triangles = [&](int level) {
+    return points * trianglesOfSphere(level) + segments * trianglesOfCapsule(level);
+  };
+  int level = 0;
+  while (level + 1 < kRoundLevels && triangles(level) > std::min(kFew, most)) ++level;
+  if (triangles(level) <= most) return level;
+  throw SceneError(ExitCode::BadInput, document.path, "/meshes",
+                   "points and lines are too many to be spheres and rods: " + std::to_string(most / 8) +
+                       " points can be, or " + std::to_string(most / 12) +
+                       " lines; leave some out, or render without --point-radius");
 }
 
 bool isPacked(const Primitive& primitive) { return primitive.extensions.contains("KHR_draco_mesh_compression"); }

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "renderer/scene/data/round_shapes.h"
 #include "renderer/scene/gltf/document/gltf_document.h"
 #include "renderer/scene/gltf/gltf_material.h"
 
@@ -25,6 +26,7 @@ struct MeshJob : MeshPose {
   MaterialTable::Uvs uvs;
   bool needsTangents = false;
   bool keepAllAttributes = false;
+  RoundShape round;             // of points and lines
   glm::dvec3 origin{0};         // taken from skinned positions
   std::vector<MeshPose> later;  // at the steps 1, 2, … of the scene's motion; empty: it keeps its shape
 };
@@ -52,7 +54,11 @@ TriangleMesh buildMovingMesh(const Document& document, const MeshJob& job, Repor
 // Whether Draco holds its attributes.
 bool isPacked(const Primitive& primitive);
 
-// Memory a built primitive takes at most, from the counts of its accessors.
+// RoundShape::level of all points and lines: the finest of which they together have few enough triangles. Throws
+// SceneError where the coarsest is too much.
+int roundLevel(const Document& document, const std::vector<MeshJob>& jobs);
+
+// Memory a built primitive takes at most, from the counts of its accessors, but for points and lines.
 uint64_t estimatedBytes(const Document& document, const Primitive& primitive);
 
 }  // namespace braid::gltf

@@ -8,6 +8,7 @@
 #include "renderer/scene/data/placement.h"
 #include "renderer/scene/gltf/poses/gltf_cameras_lights.h"
 #include "renderer/scene/gltf/poses/gltf_motion.h"
+#include "renderer/scene/gltf/poses/gltf_scene_nodes.h"
 #include "renderer/scene/gltf/gltf_variants.h"
 
 namespace braid::gltf {
@@ -19,6 +20,7 @@ struct MeshKey {
   const Primitive* primitive;
   int skin;
   std::vector<float> weights;
+  std::array<double, 9> frame{};  // RoundShape::toWorld of points and lines
   auto operator<=>(const MeshKey&) const = default;
 };
 
@@ -40,8 +42,8 @@ class SceneBuilder {
   }
 
   void build() {
-    const std::vector<int> nodes = nodesOfScene();
-    poses_ = posesWhileOpen(document_, options_, shown(nodes));
+    const std::vector<int> nodes = nodesOfScene(document_, options_);
+    poses_ = posesWhileOpen(document_, options_, nodesThatShow(document_, options_, nodes));
     scene_.motion = poses_.motion;
     for (const int node : nodes) {
       views_.addCamera(node, poses_);
@@ -55,65 +57,6 @@ class SceneBuilder {
 
  private:
   const tinygltf::Node& nodeAt(int node) const { return document_.model.nodes[static_cast<size_t>(node)]; }
-
-  std::vector<int> rootsOfScene() {
-    const std::vector<tinygltf::Scene>& scenes = document_.model.scenes;
-    if (options_.scene && (*options_.scene < 0 || static_cast<size_t>(*options_.scene) >= scenes.size())) {
-      throw SceneError(ExitCode::BadInput, document_.path, "/scenes",
-                       "scene " + std::to_string(*options_.scene) + " was asked for, but the file has " +
-                           counted(scenes.size(), "scene", "scenes"));
-    }
-    const int chosen = options_.scene ? *options_.scene : std::max(document_.model.defaultScene, 0);
-    document_.usage.mark("scenes", chosen);
-    if (!scenes.empty()) return scenes[static_cast<size_t>(chosen)].nodes;
-    document_.report.warn("", "the file has no scene; all its nodes are shown");
-    std::vector<int> roots;
-    for (size_t i = 0; i < document_.parents.size(); ++i) {
-      if (document_.parents[i] < 0) roots.push_back(static_cast<int>(i));
-    }
-    return roots;
-  }
-
-  // Depth first in the order of the file.
-  std::vector<int> nodesOfScene() {
-    std::vector<int> order, stack = rootsOfScene();
-    std::reverse(stack.begin(), stack.end());
-    std::vector<bool> seen(document_.model.nodes.size(), false);
-    while (!stack.empty()) {
-      const int node = stack.back();
-      stack.pop_back();
-      if (node < 0 || seen[static_cast<size_t>(node)]) continue;
-      seen[static_cast<size_t>(node)] = true;
-      document_.usage.mark("nodes", node);
-      order.push_back(node);
-      const std::vector<int>& children = nodeAt(node).children;
-      stack.insert(stack.end(), children.rbegin(), children.rend());
-    }
-    return order;
-  }
-
-  // The nodes that the picture depends on.
-  std::vector<int> shown(const std::vector<int>& nodes) const {
-    std::vector<int> list;
-    std::vector<bool> hidden(document_.parents.size(), false);
-    size_t cameras = 0;
-    for (const int node : nodes) {
-      const tinygltf::Node& source = nodeAt(node);
-      const int parent = document_.parents[static_cast<size_t>(node)];
-      const bool unseen = !isVisible(source) || (parent >= 0 && hidden[static_cast<size_t>(parent)]);
-      hidden[static_cast<size_t>(node)] = unseen;
-      const bool camera = source.camera >= 0 && looks(options_.camera, cameraName(document_, node, cameras), cameras);
-      cameras += source.camera >= 0 ? 1 : 0;
-      const bool light = member(source.extensions, "KHR_lights_punctual").IsObject();
-      if (camera || (!unseen && (light || source.mesh >= 0))) list.push_back(node);
-      if (unseen || source.mesh < 0 || source.skin < 0) continue;
-      for (const int joint : document_.model.skins[static_cast<size_t>(source.skin)].joints)
-        if (joint >= 0) list.push_back(joint);
-    }
-    std::sort(list.begin(), list.end());
-    list.erase(std::unique(list.begin(), list.end()), list.end());
-    return list;
-  }
 
   void addMesh(int index) {
     const tinygltf::Node& node = nodeAt(index);
@@ -131,9 +74,13 @@ class SceneBuilder {
       job.primitive = &mesh.primitives[p];
       job.place = "/meshes/" + std::to_string(node.mesh) + "/primitives/" + std::to_string(p);
       job.name = name + (mesh.primitives.size() > 1 ? "/" + std::to_string(p) : "");
-      const uint32_t number = placeJob(std::move(job), skin, index);
+      const bool isRound = options_.pointRadius > 0 && job.primitive->mode < 4;
       budget(placed.size() * placed.front().size() * sizeof(MeshInstance));
+      uint32_t number = kNone;
       for (const Track& track : placed) {
+        // Points and lines are as thick as they are in the world, however a node scales them.
+        if (isRound) job.round.toWorld = roundFrame(glm::dmat3(track.front()));
+        if (isRound || number == kNone) number = placeJob(job, skin, index);
         scene_.instances.push_back({number, Mat4(1), {}});
         transforms_.push_back(track.front());
         steps_.emplace_back(track.begin() + 1, track.end());
@@ -183,7 +130,9 @@ class SceneBuilder {
     const Primitive& primitive = *job.primitive;
     const auto i = static_cast<size_t>(node);
     const bool morphs = !primitive.targets.empty() && poses_.morphed(node);
-    MeshKey key{representative(primitive), skin, {}};
+    MeshKey key{representative(primitive), skin, {}, {}};
+    const double* frame = glm::value_ptr(job.round.toWorld);
+    std::copy(frame, frame + 9, key.frame.begin());
     if (!primitive.targets.empty()) key.weights = job.weights = poses_.first.weights[i];
     for (size_t k = 0; morphs && k < poses_.later.size(); ++k) {
       const std::vector<float>& weights = poses_.later[k].weights[i];
@@ -200,6 +149,7 @@ class SceneBuilder {
     useData(primitive);
     job.material = materials_.use(materialOf(primitive));
     job.uvs = materials_.uvs(job.material);
+    job.round.radius = options_.pointRadius;
     job.needsTangents = scene_.materials[job.material].needsTangents();
     job.keepAllAttributes = options_.keepAllAttributes;
     jobs_.push_back(std::move(job));
@@ -252,11 +202,13 @@ class SceneBuilder {
   }
 
   void buildMeshes() {
+    const int level = roundLevel(document_, jobs_);
+    for (MeshJob& job : jobs_) job.round.level = level;
     std::vector<TriangleMesh> built(jobs_.size());
     std::vector<Report> reports(jobs_.size());
     parallelFor(jobs_.size(), [&](size_t i) { built[i] = buildMovingMesh(document_, jobs_[i], reports[i]); });
     for (const Report& report : reports) document_.report.append(report);
-    // Points, lines and empty primitives leave no mesh.
+    // Empty primitives leave no mesh.
     std::vector<uint32_t> placed(jobs_.size(), kNone);
     for (size_t i = 0; i < built.size(); ++i) {
       if (built[i].triangles.empty()) continue;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras and punctual lights of a file as plain data, at the origin.
+// Cameras and punctual lights of a file as plain data, at the origin; the image-based light of the scene.
 #include <algorithm>
 #include <cmath>
 
+#include "renderer/scene/data/cube_environment.h"
 #include "renderer/scene/gltf/document/gltf_document.h"
+#include "renderer/scene/gltf/gltf_images.h"
 
 namespace braid::gltf {
 
@@ -43,6 +45,100 @@ void readCone(Report& report, const std::string& place, const tinygltf::SpotLigh
               "a light's inner cone is not smaller than its outer cone; it is narrowed");
   light.innerConeAngle = light.outerConeAngle * 0.999f;
 }
+
+// One that the scene refers to, whose flaws cost it alone.
+class ImageBasedLight {
+ public:
+  ImageBasedLight(Document& document, const Value& light, std::string place)
+      : document_(document), light_(light), place_(std::move(place)) {}
+
+  std::optional<EnvironmentData> read() {
+    const double intensity = number(light_, "intensity", 1);
+    readCoefficients();
+    EnvironmentData environment;
+    environment.radiance = Spectrum(static_cast<float>(intensity));
+    environment.ofFile = true;
+    if (std::optional<CubeFaces> faces = readFaces()) {
+      const CubeLayout layout = layoutOf(*faces);
+      if (layout != CubeLayout::Mirrored)
+        document_.report.warn(place_ + "/specularImages",
+                              "faces do not meet as the specification mirrors them, but as OpenGL has them, upright or "
+                              "upside down; they are read so");
+      environment.image = cubeEnvironment(*faces, layout, rotation());
+    } else if (coefficients_) {
+      environment.image = irradianceEnvironment(*coefficients_, rotation());
+    } else {
+      return {};
+    }
+    const std::vector<float>& radiance = environment.image->floats;
+    if (intensity > 0 && std::any_of(radiance.begin(), radiance.end(), [](float v) { return v > 0; }))
+      return environment;
+    document_.report.warn(place_, "a light is black; it is left out");
+    return {};
+  }
+
+ private:
+  void readCoefficients() {
+    const Value& rows = member(light_, "irradianceCoefficients");
+    IrradianceCoefficients all{};
+    bool good = rows.ArrayLen() == all.size();
+    for (size_t k = 0; good && k < all.size(); ++k) {
+      const Value& row = rows.Get(static_cast<int>(k));
+      good = row.ArrayLen() == 3;
+      for (size_t c = 0; good && c < 3; ++c)
+        all[k][static_cast<int>(c)] = static_cast<float>(row.Get(static_cast<int>(c)).GetNumberAsDouble());
+    }
+    if (good) coefficients_ = all;
+  }
+
+  const char* meanwhile() const {
+    return coefficients_ ? "its irradiance coefficients light the scene, without detail" : "the light is left out";
+  }
+
+  std::nullopt_t refuse(const std::string& place, const std::string& text) {
+    document_.report.problem(place, text, meanwhile());
+    return std::nullopt;
+  }
+
+  // Those of the first level; the others are blurred copies of it.
+  std::optional<CubeFaces> readFaces() {
+    const std::string place = place_ + "/specularImages/0";
+    const Value& levels = member(light_, "specularImages");
+    if (levels.ArrayLen() == 0 || levels.Get(0).ArrayLen() != 6)
+      return refuse(place, "lists no six images; write one for each face of the cube");
+    std::vector<int> images;
+    for (int k = 0; k < 6; ++k) {
+      images.push_back(levels.Get(0).Get(k).GetNumberAsInt());
+      if (images.back() < 0) return refuse(place, "names an image that does not exist; write one for each face");
+    }
+    const std::vector<std::shared_ptr<const Image>> read = ImageTable(document_, {}).read(images, meanwhile());
+    CubeFaces faces;
+    for (size_t k = 0; k < 6; ++k) {
+      if (!read[k]) return refuse(place, "has a face without pixels; mend its image");
+      faces[k] = read[k];
+      const int width = read[k]->width, height = read[k]->height;
+      if (width != height || width != read[0]->width)
+        return refuse(place + '/' + std::to_string(k), "is " + std::to_string(width) + " x " + std::to_string(height) +
+                                                           " pixels; the faces of a cube are squares of one size");
+    }
+    return faces;
+  }
+
+  glm::dmat3 rotation() {
+    const Value& r = member(light_, "rotation");
+    if (r.ArrayLen() != 4) return glm::dmat3(1);
+    const auto at = [&](int k) { return r.Get(k).GetNumberAsDouble(); };
+    const glm::dquat q(at(3), at(0), at(1), at(2));
+    if (glm::length(q) > 1e-6) return glm::mat3_cast(glm::normalize(q));
+    document_.report.warn(place_ + "/rotation", "is zero; no rotation is used");
+    return glm::dmat3(1);
+  }
+
+  Document& document_;
+  const Value& light_;
+  std::string place_;
+  std::optional<IrradianceCoefficients> coefficients_;
+};
 
 }  // namespace
 
@@ -91,6 +187,22 @@ void readCamerasAndLights(Document& document) {
     document.cameras.push_back(readCamera(document, document.model.cameras[i], i));
   for (size_t i = 0; i < document.model.lights.size(); ++i)
     document.lights.push_back(readLight(document, document.model.lights[i], i));
+}
+
+void readImageBasedLight(Document& document) {
+  constexpr const char* kName = "EXT_lights_image_based";
+  const size_t chosen = static_cast<size_t>(std::max(document.options.scene.value_or(document.model.defaultScene), 0));
+  if (chosen >= document.model.scenes.size()) return;
+  const int light = index(member(document.model.scenes[chosen].extensions, kName), "light");
+  if (light < 0) return;
+  const std::string place = std::string("/extensions/") + kName + "/lights/" + std::to_string(light);
+  if (!document.options.imageBasedLight) {
+    document.report.warn(place, "the light of the scene is left out: another environment is given");
+    return;
+  }
+  document.usage.mark("image-based lights", light);
+  const Value& lights = member(member(document.model.extensions, kName), "lights");
+  document.environment = ImageBasedLight(document, lights.Get(light), place).read();
 }
 
 }  // namespace braid::gltf

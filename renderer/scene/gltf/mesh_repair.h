@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "renderer/scene/data/placement.h"
 #include "renderer/scene/gltf/document/gltf_report.h"
 #include "renderer/scene/data/scene_data.h"
 
@@ -13,13 +14,6 @@ namespace braid::gltf {
 struct ExtraAttributes {
   std::vector<std::vector<Vec2>> uv;  // of each tangent frame
 };
-
-inline Vec3 normalizedOr(const Vec3& v, const Vec3& fallback) {
-  // In double: the square of a small or large float is out of range.
-  const glm::dvec3 d(v);
-  const double length = glm::length(d);
-  return length > 1e-6 && length < 1e18 ? Vec3(d / length) : fallback;
-}
 
 // The triangles of a strip, or of a fan.
 std::vector<glm::uvec3> joinedTriangles(const std::vector<uint32_t>& indices, bool isStrip);

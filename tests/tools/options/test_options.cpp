@@ -138,6 +138,8 @@ TEST_CASE("Numbers within their ranges pass, with the ends that belong to them")
   taken("--threads", "0");
   refused("--threads", "5000", "from 0 to 4096");
   refused("--clamp", "-1", "from 0");
+  taken("--point-radius", "0.001");
+  for (const char* wrong : {"0", "-1", "nan"}) refused("--point-radius", wrong, "from 1e-12 to 1e+09");
   refused("--photon-radius", "0", "from 0.01 to 1000");
   refused("--photons", "0", "from 1 to 268435456");
   taken("--js-constant", "1.25");

@@ -46,12 +46,16 @@ std::string_view without(const Field& field, bool replaced) {
 class Checker {
  public:
   Checker(Json& root, Report& report) : report_(report) {
-    for (const Field& f : rootShape()) count(root, f.name);
+    for (const Field& f : rootShape()) count(root, f.name, f.name);
     if (!root.contains("extensions") || !root["extensions"].is_object()) return;
-    for (const auto& [extension, array] :
-         {std::pair("KHR_lights_punctual", "lights"), std::pair("KHR_materials_variants", "variants")}) {
+    struct OfExtension {
+      const char *extension, *array, *name;
+    };
+    for (const auto& [extension, array, name] : {OfExtension{"KHR_lights_punctual", "lights", "lights"},
+                                                 OfExtension{"EXT_lights_image_based", "lights", "image-based lights"},
+                                                 OfExtension{"KHR_materials_variants", "variants", "variants"}}) {
       const auto found = root["extensions"].find(extension);
-      if (found != root["extensions"].end()) count(*found, array);
+      if (found != root["extensions"].end()) count(*found, array, name);
     }
   }
 
@@ -88,9 +92,9 @@ class Checker {
  private:
   using Step = std::variant<std::string_view, size_t>;
 
-  void count(const Json& parent, const char* array) {
+  void count(const Json& parent, const char* array, const char* name) {
     const auto found = parent.is_object() ? parent.find(array) : parent.end();
-    counts_[array] = parent.is_object() && found != parent.end() && found->is_array() ? found->size() : 0;
+    counts_[name] = parent.is_object() && found != parent.end() && found->is_array() ? found->size() : 0;
   }
 
   std::string pointer() const {
@@ -140,9 +144,11 @@ class Checker {
       case Kind::Index:
         return index(value, field);
       case Kind::Indices:
-        // Joints keep their places: -1 stands for a node that does not exist.
-        return list(value, field, [&](Json& entry) {
-          if (!index(entry, field)) entry = -1;
+        return indices(value, field);
+      case Kind::RealRows:
+      case Kind::IndexRows:
+        return list(value, field, [&](Json& row) {
+          if (!(field.kind == Kind::RealRows ? reals(row, field) : indices(row, field))) row = Json::array();
           return true;
         });
       case Kind::Map:
@@ -160,6 +166,17 @@ class Checker {
         });
     }
     return false;
+  }
+
+  // Joints keep their places: -1 stands for a node that does not exist.
+  bool indices(Json& value, const Field& field) {
+    if (field.count != 0 && value.is_array() && value.size() != field.count)
+      return problem(fmt::format("is {} entries; it must be an array of {} indices", value.size(), field.count),
+                     without(field, false));
+    return list(value, field, [&](Json& entry) {
+      if (!index(entry, field)) entry = -1;
+      return true;
+    });
   }
 
   bool isObject(const Json& value, const Field& field) { return value.is_object() || wrong(value, "an object", field); }

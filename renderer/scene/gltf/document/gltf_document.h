@@ -83,7 +83,8 @@ struct Document {
   std::vector<Material> materials;    // texture references hold the indices and uv sets of the file
   std::vector<CameraData> cameras;    // both without their nodes' transforms
   std::vector<PunctualLight> lights;
-  std::vector<int> parents;  // of the nodes
+  std::optional<EnvironmentData> environment;  // of the scene's image-based light
+  std::vector<int> parents;                    // of the nodes
   // What pointers of animations lead to, and the checked JSON of materials, cameras and lights; null: nothing does.
   std::vector<AnimatedProperty> properties;
   std::shared_ptr<const nlohmann::json> animatable;
@@ -117,6 +118,7 @@ void resolveViews(Document& document);
 // gltf_material.cpp, gltf_optics.cpp: plain data; what is out of range is reported and replaced.
 void readMaterials(Document& document);
 void readCamerasAndLights(Document& document);
+void readImageBasedLight(Document& document);
 Material readMaterial(Document& document, const tinygltf::Material& source, size_t index);
 CameraData readCamera(Document& document, const tinygltf::Camera& source, size_t index);
 PunctualLight readLight(Document& document, const tinygltf::Light& source, size_t index);

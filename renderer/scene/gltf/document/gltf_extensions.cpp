@@ -14,10 +14,10 @@ namespace {
 
 // Beside those of materials, which gltf_schema.cpp lists.
 constexpr std::array kRendered = {
-    "EXT_mesh_gpu_instancing", "EXT_meshopt_compression",    "EXT_texture_avif",    "EXT_texture_webp",
-    "KHR_animation_pointer",   "KHR_draco_mesh_compression", "KHR_lights_punctual", "KHR_materials_variants",
-    "KHR_mesh_quantization",   "KHR_meshopt_compression",    "KHR_node_visibility", "KHR_texture_basisu",
-    "KHR_texture_transform",
+    "EXT_lights_image_based", "EXT_mesh_gpu_instancing", "EXT_meshopt_compression",    "EXT_texture_avif",
+    "EXT_texture_webp",       "KHR_animation_pointer",   "KHR_draco_mesh_compression", "KHR_lights_punctual",
+    "KHR_materials_variants", "KHR_mesh_quantization",   "KHR_meshopt_compression",    "KHR_node_visibility",
+    "KHR_texture_basisu",     "KHR_texture_transform",
 };
 
 // No pixel depends on them: metadata, feature ids, outlines, levels of detail beside the finest, interaction, sound,

@@ -27,8 +27,10 @@ std::string kindOf(const std::string& text) {
 
 // The array and index that a place such as /meshes/3/primitives/0 begins with; index -1: none.
 std::pair<std::string, int> objectOf(const std::string& place) {
-  constexpr std::string_view kLights = "/extensions/KHR_lights_punctual";
-  const size_t start = place.starts_with(kLights) ? kLights.size() + 1 : 1;
+  constexpr std::string_view kLights = "/extensions/KHR_lights_punctual",
+                             kImages = "/extensions/EXT_lights_image_based";
+  const bool ofImages = place.starts_with(kImages);
+  const size_t start = place.starts_with(kLights) ? kLights.size() + 1 : ofImages ? kImages.size() + 1 : 1;
   const size_t end = place.find('/', start);
   if (end == std::string::npos || end + 1 >= place.size()) return {"", -1};
   int index = 0;
@@ -36,7 +38,7 @@ std::pair<std::string, int> objectOf(const std::string& place) {
   for (; at < place.size() && std::isdigit(static_cast<unsigned char>(place[at])) && index < 100'000'000; ++at)
     index = index * 10 + (place[at] - '0');
   if (at == end + 1 || (at < place.size() && place[at] != '/')) return {"", -1};
-  return {place.substr(start, end - start), index};
+  return {ofImages ? "image-based lights" : place.substr(start, end - start), index};
 }
 
 }  // namespace
@@ -65,9 +67,10 @@ bool Usage::mark(const std::string& array, int index) {
 }
 
 bool Usage::covers(const std::string& place) const {
-  static constexpr std::array kArrays{"accessors", "animations", "bufferViews", "buffers", "cameras",
-                                      "images",    "lights",     "materials",   "meshes",  "nodes",
-                                      "samplers",  "scenes",     "skins",       "textures"};
+  static constexpr std::array kArrays{
+      "accessors", "animations", "bufferViews", "buffers", "cameras", "image-based lights",
+      "images",    "lights",     "materials",   "meshes",  "nodes",   "samplers",
+      "scenes",    "skins",      "textures"};
   const auto [array, index] = objectOf(place);
   if (index < 0 || std::find(kArrays.begin(), kArrays.end(), array) == kArrays.end()) return true;
   const auto found = used_.find(array);

@@ -15,7 +15,8 @@ namespace braid::gltf {
 // The objects of a file that the chosen scene, pose and cameras read, by array ("meshes") and index.
 class Usage {
  public:
-  // Returns whether it is marked for the first time. Negative indices are no objects.
+  // Image-based lights have an array of that name. Returns whether it is marked for the first time. Negative indices
+  // are no objects.
   bool mark(const std::string& array, int index);
   // Whether the object that a JSON pointer leads into is used; places outside of arrays of objects always are.
   bool covers(const std::string& place) const;

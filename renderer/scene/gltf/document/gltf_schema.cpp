@@ -218,7 +218,9 @@ constexpr Field kNode[] = {text("name"),
                            index("camera", "cameras"),
                            index("skin", "skins"),
                            object("extensions", kNodeExtensions)};
-constexpr Field kScene[] = {text("name"), indices("nodes", "nodes")};
+constexpr Field kSceneLight[] = {index("light", "image-based lights")};
+constexpr Field kSceneExtensions[] = {object("EXT_lights_image_based", kSceneLight)};
+constexpr Field kScene[] = {text("name"), indices("nodes", "nodes"), object("extensions", kSceneExtensions)};
 constexpr Field kSkin[] = {indices("joints", "nodes", "list the nodes that move the skin"),
                            index("inverseBindMatrices", "accessors")};
 
@@ -252,9 +254,16 @@ constexpr Field kLight[] = {
     reals("color", 3), factor("intensity", 0, kMost),
     real("range"),     object("spot", kSpot)};
 constexpr Field kLights[] = {list("lights", kLight)};
+constexpr Field kImageBasedLight[] = {text("name"),
+                                      reals("rotation", 4),
+                                      factor("intensity", 0, kMost),
+                                      {.name = "irradianceCoefficients", .kind = Kind::RealRows, .count = 3},
+                                      {.name = "specularImages", .kind = Kind::IndexRows, .of = "images", .count = 6}};
+constexpr Field kImageBasedLights[] = {list("lights", kImageBasedLight)};
 constexpr Field kVariant[] = {{.name = "name", .kind = Kind::Text, .fallback = "\"\""}};
 constexpr Field kVariants[] = {list("variants", kVariant)};
-constexpr Field kRootExtensions[] = {object("KHR_lights_punctual", kLights),
+constexpr Field kRootExtensions[] = {object("EXT_lights_image_based", kImageBasedLights),
+                                     object("KHR_lights_punctual", kLights),
                                      object("KHR_materials_variants", kVariants)};
 
 constexpr const char* kReadAs2 = "it is read as 2.0";

@@ -13,17 +13,33 @@
 
 namespace braid::gltf {
 
-enum class Kind : uint8_t { Bool, Text, Texts, Word, Real, Reals, Colour, Whole, Index, Indices, Map, Object, List };
+enum class Kind : uint8_t {
+  Bool,
+  Text,
+  Texts,
+  Word,
+  Real,
+  Reals,
+  RealRows,  // arrays of numbers; a row that is wrong becomes empty
+  Colour,
+  Whole,
+  Index,
+  Indices,
+  IndexRows,  // arrays of indices, -1 for one that points at nothing; a row of another length becomes empty
+  Map,
+  Object,
+  List
+};
 
 struct Field {
   const char* name;
   Kind kind;
-  // Index, Indices, Map: the array that is pointed at. Word: the words, separated by ", ". Whole: the numbers
-  // that are allowed, if not all.
+  // Index, Indices, IndexRows, Map: the array that is pointed at. Word: the words, separated by ", ". Whole: the
+  // numbers that are allowed, if not all.
   const char* of = nullptr;
   // Real, Colour: values outside are clamped with a warning. Whole: those above are problems.
   double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
-  size_t count = 0;                   // Reals: how many, 0: any number
+  size_t count = 0;                   // Reals, and of a row: how many, 0: any number
   std::span<const Field> shape = {};  // of an Object, or of each entry of a List
   const char* mend = nullptr;         // a required member: what to write
   // JSON in place of a required member that is missing or wrong; none: the object is left out.
