@@ -73,6 +73,17 @@ bool PathKernel::passPane(PathState& path, const Hit& hit, const Spectrum& weigh
   return ++path.panes < kMostPanes;
 }
 
+// No light is sampled within a medium, and what comes after an event is not direct light.
+Flight PathKernel::finishFlight(PathState& path, const Hit* hit) const {
+  const Flight flight = walk_.finish(path, hit);
+  if (flight != Flight::Surface) path.lightCouldNotBeSampled = true;
+  if (flight != Flight::Scattered) return flight;
+  path.featureDistance += path.walk.flight;
+  path.bounces = std::max(path.bounces + 1, 2);
+  if (observer_) observer_->onScattering(path);
+  return flight;
+}
+
 // What an unlit surface shows, it shows to the camera and to mirrors only: it lights nothing (KHR_materials_unlit).
 void PathKernel::addUnlit(PathState& path, const Hit& hit, PathSample& sample) const {
   const Spectrum color = baseColorAt(scene_, hit);
@@ -84,7 +95,8 @@ void PathKernel::addUnlit(PathState& path, const Hit& hit, PathSample& sample) c
 
 void PathKernel::recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsdf, PathSample& sample) const {
   path.featureDistance += hit.distance;
-  if (!bsdf.hasNonDelta() && (path.segments < plan_.settings.maxDepth || bsdf.passesStraight())) return;
+  const bool goesOn = path.segments < plan_.settings.maxDepth || bsdf.passesStraight();
+  if (!bsdf.hasNonDelta() && goesOn && !hit.material->scatters()) return;
   path.featuresDone = true;
   surfaceFeatures(scene_, hit, bsdf, path.featureDistance, sample.features);
 }
@@ -198,11 +210,13 @@ void PathKernel::run() {
 }
 
 void PathKernel::queueRay(int slot, PathState& path) {
+  const float reach = walk_.any() ? walk_.begin(path) : kInfinity;
   if (filtered_) {
-    const uint32_t salt = sampler_.salt(path.key, path.block() + static_cast<uint32_t>(path.nullCrossings));
+    const uint32_t salt = sampler_.salt(path.key, path.block() + static_cast<uint32_t>(path.nullCrossings) +
+                                                      (static_cast<uint32_t>(path.walk.rays) << 12));
     path.salt = (salt & ~kCameraRay) | (path.fromCamera() ? kCameraRay : 0);
   }
-  rays_.set(slot, {path.origin, path.direction, kInfinity, path.salt, path.time});
+  rays_.set(slot, {path.origin, path.direction, reach, path.salt, path.time});
   if (observer_) observer_->onRay(path);
 }
 
@@ -246,12 +260,22 @@ void PathKernel::prepareShading() {
 void PathKernel::shadeActive() {
   prepareShading();
   int alive = 0;
+  const auto goOn = [&](int p) {
+    active_[static_cast<size_t>(alive)] = p;
+    queueRay(alive++, path_[static_cast<size_t>(p)]);
+  };
   shadowCount_ = 0;
   for (int a = 0; a < activeCount_; ++a) {
     const int p = active_[static_cast<size_t>(a)];
     const auto i = static_cast<size_t>(p), ray = static_cast<size_t>(a);
     if (recorder_) recorder_->arrive(p, sample_[i].radiance);
-    if (!(query_[ray].t < kInfinity)) {
+    const bool met = query_[ray].t < kInfinity;
+    if (path_[i].walk.medium) {
+      const Flight flight = finishFlight(path_[i], met ? &hit_[ray] : nullptr);
+      if (flight == Flight::Scattered) goOn(p);
+      if (flight == Flight::Scattered || flight == Flight::Absorbed) continue;
+    }
+    if (!met) {
       ++missCount;
       if (observer_) observer_->onMiss();
       addEnvironment(path_[i], sample_[i]);
@@ -265,9 +289,7 @@ void PathKernel::shadeActive() {
       shadowRays_.set(shadowCount_, shadow.ray, shadow.index);
       shadowPath_[static_cast<size_t>(shadowCount_++)] = p;
     }
-    if (!goesOn) continue;
-    active_[static_cast<size_t>(alive)] = p;
-    queueRay(alive++, path_[i]);
+    if (goesOn) goOn(p);
   }
   activeCount_ = alive;
 }
@@ -292,7 +314,7 @@ void PathKernel::traceShadows() {
 bool PathKernel::shade(PathState& path, const Hit& hit, const SampleBlock& block, PathSample& sample, ShadowRay& shadow,
                        bool& hasShadow) {
   if (observer_) observer_->onHit(hit);
-  path.throughput *= mediaTransmittance(scene_, path.media, hit.distance);
+  if (!path.walk.medium) path.throughput *= mediaTransmittance(scene_, path.media, hit.distance);
   const MaterialSummary& material = context_.summaryOf(hit);
   if (material.special()) {
     if (material.volume && crossNullInterface(path, hit)) return path.nullCrossings < kMaxNullCrossings;
@@ -313,7 +335,7 @@ bool PathKernel::shade(PathState& path, const Hit& hit, const SampleBlock& block
   if (path.segments >= plan_.settings.maxDepth) return passPane(path, hit, bsdf.straightTransmittance());
 
   const bool twoSided = (lobes & kTransmittingLobes) != 0;
-  const bool asks = guide_ && path.segments <= kGuidedSegments && bsdf.hasNonDelta();
+  const bool asks = guide_ && path.segments <= kGuidedSegments && bsdf.hasNonDelta() && !path.walk.medium;
   const GuidedBsdf guided = asks ? GuidedBsdf(bsdf, *guide_, hit) : GuidedBsdf(bsdf);
   if (guided.guided()) ++guidedCount;
   if (bsdf.hasNonDelta()) {

@@ -32,6 +32,7 @@ class PathObserver {
   virtual void onRay(const PathState& path) = 0;
   virtual void onMiss() = 0;
   virtual void onHit(const Hit& hit) = 0;
+  virtual void onScattering(const PathState&) {}  // within a medium; it has the new direction
   virtual void onLight(const ShadowRay& ray, bool visible) = 0;
 };
 
@@ -50,6 +51,7 @@ class PathKernel {
         roulette_(roulette),
         wantFeatures_(plan.kept.features),
         filtered_(context.scene.accel().filtered()),
+        walk_(context.scene, sampler),
         cameraMedia_(mediaOfCamera(context.scene, plan.camera)),
         shadowRays_(context) {}
 
@@ -88,6 +90,8 @@ class PathKernel {
   void add(const Spectrum& radiance, bool direct, PathSample& sample) const;
   bool crossNullInterface(PathState& path, const Hit& hit) const;
   bool passPane(PathState& path, const Hit& hit, const Spectrum& weight) const;
+  // Takes a path to the end of its ray through a medium that scatters; `hit` is null where it met nothing.
+  Flight finishFlight(PathState& path, const Hit* hit) const;
   bool sampleLight(const PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided,
                    const SampleBlock& block, ShadowRay& shadow) const;
   bool scatter(PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided, const SampleBlock& block) const;
@@ -104,6 +108,7 @@ class PathKernel {
   PathRecorder* recorder_ = nullptr;
   Roulette roulette_;
   bool wantFeatures_, filtered_;
+  RandomWalk walk_;
   MediaStack cameraMedia_;  // the solids that the camera is inside of
 
   int count_ = 0;
