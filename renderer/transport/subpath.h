@@ -6,8 +6,7 @@
 //
 // Conventions that make all ways agree:
 //   - densities per area use the geometric normals, BSDF cosines the shading normals;
-//   - delta scattering, null interfaces (media.h) and walks through media (random_walk.h) are vertices that no one can
-//     connect to; a walk's own density is alike from both ends, so that it leaves all weights;
+//   - delta scattering, null interfaces (media.h) and walks through media are vertices that no one can connect to;
 //   - a pane is no vertex for light that goes straight on through it: neither densities nor lengths of paths know of
 //     it, and shadow rays pass it too (visibility.h). It is an ordinary vertex for all else that its surface does;
 //   - the light side must see a surface from the same side by both normals, as for light samples of a path tracer; a

@@ -190,6 +190,28 @@ TEST_CASE("volume scattering: a point light within wax is found by subpaths from
   CHECK(plan.text().find("+ volume scattering") != std::string::npos);
 }
 
+TEST_CASE("volume scattering: the plan names smooth solids that lights without size do not show in") {
+  const auto named = [](const Material& material) {
+    SceneData data = inWhite(material, ball(), before());
+    data.materials[0].name = "soap";
+    data.lights.push_back({});
+    const Scene scene(std::move(data));
+    const Plan plan = makePlan(scene, scene.data().cameras.at(0), settingsOf("pt", 8, 8, 1), integrators());
+    return plan.text().find("- lights without size in 'soap'") != std::string::npos;
+  };
+  CHECK(named(scatteringSolid(Spectrum(0.9f), 0.1f, 1.5f)));
+  CHECK_FALSE(named(scatteringSolid(Spectrum(0.9f), 0.1f, 1.5f, 0.3f)));
+  CHECK_FALSE(named(scatteringSolid(Spectrum(0), 0.1f, 1.5f)));
+  CHECK_FALSE(named(wax(Spectrum(0.9f), 0.1f)));
+}
+
+TEST_CASE("volume scattering: guided paths have the same expectation") {
+  const Scene scene(cabinet(0.5f));
+  Settings guided = settingsOf("pt", 12, 12, 100, 3);
+  guided.guiding = Guiding::On;
+  CHECK(worst(passMeans(scene, guided, 6), passMeans(scene, settingsOf("pt", 12, 12, 200, 4), 6), 0) < 1);
+}
+
 TEST_CASE("volume scattering: the number of threads changes no bit") {
   const Scene scene(cabinet(0.3f));
   for (const char* name : kAll) {
