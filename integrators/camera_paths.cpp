@@ -35,7 +35,8 @@ void unlitFeatures(const Spectrum& color, const Hit& hit, float distance, Featur
 }
 
 bool recordFeatures(const Scene& scene, const SubpathVertex& vertex, int maxDepth, FeatureSample& features) {
-  if (!vertex.bsdf.hasNonDelta() && (vertex.segments < maxDepth || vertex.bsdf.passesStraight())) return false;
+  const bool goesOn = vertex.segments < maxDepth || vertex.bsdf.passesStraight();
+  if (!vertex.bsdf.hasNonDelta() && goesOn && !vertex.hit.material->scatters()) return false;
   surfaceFeatures(scene, vertex.hit, vertex.bsdf, vertex.travelled, features);
   return true;
 }

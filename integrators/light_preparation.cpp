@@ -18,6 +18,8 @@ constexpr double kCausticVariance = 10;
 // caustics cannot be met by camera paths at all, the unbiased image needs them.
 constexpr double kCausticShare = 0.04;
 constexpr double kUnreachableShare = 0.001;
+// Of all light, that media bring from lights without size.
+constexpr double kMediaShare = 0.01;
 
 // The unit of splats follows the irradiance that the lights would give on the scene's sphere, so that scaling all
 // lights by a power of two scales the image and nothing else.
@@ -45,6 +47,11 @@ Applies photonsApply(const SceneTraits& traits, const LightReach& reach) {
 }
 
 Applies connectionsApply(const SceneTraits& traits, const LightReach& reach) {
+  if (reach.throughMedia >= kMediaShare)
+    return {true,
+            fmt::format("{:.2g} % of the light in view comes from lights without size through media that scatter: "
+                        "no camera path finds it",
+                        100 * reach.throughMedia)};
   Applies photons = photonsApply(traits, reach);
   if (!photons.yes || reach.caustic >= kCausticShare) return photons;
   if (reach.unreachable >= kUnreachableShare)

@@ -85,6 +85,17 @@ bool PathKernel::passPane(PathState& path, const Hit& hit, const Spectrum& weigh
   return ++path.panes < kMostPanes;
 }
 
+// No light is sampled within a medium, and what comes after an event is not direct light.
+Flight PathKernel::finishFlight(PathState& path, const Hit* hit) const {
+  const Flight flight = walk_.finish(path, hit);
+  if (flight != Flight::Surface) path.lightCouldNotBeSampled = true;
+  if (flight != Flight::Scattered) return flight;
+  path.featureDistance += path.walk.flight;
+  path.bounces = std::max(path.bounces + 1, 2);
+  if (observer_) observer_->onScattering(path);
+  return flight;
+}
+
 // What an unlit surface shows, it shows to the camera and to mirrors only: it lights nothing (KHR_materials_unlit).
 void PathKernel::addUnlit(PathState& path, const Hit& hit, PathSample& sample) const {
   const Spectrum color = baseColorAt(scene_, hit);
@@ -96,7 +107,8 @@ void PathKernel::addUnlit(PathState& path, const Hit& hit, PathSample& sample) c
 
 void PathKernel::recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsdf, PathSample& sample) const {
   path.featureDistance += hit.distance;
-  if (!bsdf.hasNonDelta() && (path.segments < plan_.settings.maxDepth || bsdf.passesStraight())) return;
+  const bool goesOn = path.segments < plan_.settings.maxDepth || bsdf.passesStraight();
+  if (!bsdf.hasNonDelta() && goesOn && !hit.material->scatters()) return;
   path.featuresDone = true;
   surfaceFeatures(scene_, hit, bsdf, path.featureDistance, sample.features);
 }
@@ -190,8 +202,6 @@ bool PathKernel::turn(PathState& path, const Hit& hit, const Bsdf& bsdf, bool tw
   return true;
 }
 
-void PathKernel::start(int x, int y, uint64_t key) { startAt(timeOf(x, y, key), x, y, key); }
-
 float PathKernel::timeOf(int x, int y, uint64_t key) const {
   return scene_.moves() ? pixelTime(scene_, plan_, sampler_.block(key, 0), x, y) : 0;
 }
@@ -223,18 +233,20 @@ void PathKernel::run() {
   const bool prefetch = scene_.traits().triangles > 16384;
   while (activeCount_ > 0) {
     traceActive();
-    if (prefetch) prefetchHits();
+    if (prefetch) prefetchVertices(scene_, {query_.data(), static_cast<size_t>(activeCount_)});
     shadeActive();
     traceShadows();
   }
 }
 
 void PathKernel::queueRay(int slot, PathState& path) {
+  const float reach = walk_.any() ? walk_.begin(path) : kInfinity;
   if (filtered_) {
-    const uint32_t salt = sampler_.salt(path.key, path.block() + static_cast<uint32_t>(path.nullCrossings));
+    const uint32_t salt = sampler_.salt(path.key, path.block() + static_cast<uint32_t>(path.nullCrossings) +
+                                                      (static_cast<uint32_t>(path.walk.rays) << 12));
     path.salt = (salt & ~kCameraRay) | (path.fromCamera() ? kCameraRay : 0);
   }
-  rays_.set(slot, {path.origin, path.direction, kInfinity, path.salt, path.time});
+  rays_.set(slot, {path.origin, path.direction, reach, path.salt, path.time});
   if (observer_) observer_->onRay(path);
 }
 
@@ -243,24 +255,6 @@ void PathKernel::traceActive() {
     for (int a = 0; a < activeCount_; ++a) record_->push_back({rays_.get(a), false});
   scene_.accel().intersect(rays_, activeCount_, query_.data());
   rayCount += static_cast<uint64_t>(activeCount_);
-}
-
-// Fetches the vertices of all hits while nothing waits for them.
-void PathKernel::prefetchHits() const {
-  for (int a = 0; a < activeCount_; ++a) {
-    const RayHit& hit = query_[static_cast<size_t>(a)];
-    if (hit.t < kInfinity) __builtin_prefetch(&scene_.mesh(hit.mesh).triangles[hit.triangle]);
-  }
-  for (int a = 0; a < activeCount_; ++a) {
-    const RayHit& hit = query_[static_cast<size_t>(a)];
-    if (!(hit.t < kInfinity)) continue;
-    const TriangleMesh& mesh = scene_.mesh(hit.mesh);
-    const glm::uvec3& index = mesh.triangles[hit.triangle];
-    for (int k = 0; k < 3; ++k) {
-      __builtin_prefetch(&mesh.positions[index[k]]);
-      if (!mesh.normals.empty()) __builtin_prefetch(&mesh.normals[index[k]]);
-    }
-  }
 }
 
 // What needs nothing but the ray and the path's key comes first, for all paths: a short loop, of which the processor
@@ -278,20 +272,28 @@ void PathKernel::prepareShading() {
 void PathKernel::shadeActive() {
   prepareShading();
   int alive = 0;
+  const auto goOn = [&](int p) {
+    active_[static_cast<size_t>(alive)] = p;
+    queueRay(alive++, path_[static_cast<size_t>(p)]);
+  };
   shadowCount_ = 0;
   for (int a = 0; a < activeCount_; ++a) {
     const int p = active_[static_cast<size_t>(a)];
     const auto i = static_cast<size_t>(p), ray = static_cast<size_t>(a);
     if (recorder_) recorder_->arrive(p, sample_[i].radiance);
-    if (!(query_[ray].t < kInfinity)) {
+    const bool met = query_[ray].t < kInfinity;
+    if (path_[i].walk.medium) {
+      const Flight flight = finishFlight(path_[i], met ? &hit_[ray] : nullptr);
+      if (flight == Flight::Scattered) goOn(p);
+      if (flight == Flight::Scattered || flight == Flight::Absorbed) continue;
+    }
+    if (!met) {
       ++missCount;
       if (observer_) observer_->onMiss();
       addEnvironment(path_[i], sample_[i]);
       continue;
     }
-    if (!shade(p, hit_[ray], block_[ray])) continue;
-    active_[static_cast<size_t>(alive)] = p;
-    queueRay(alive++, path_[i]);
+    if (shade(p, hit_[ray], block_[ray])) goOn(p);
   }
   activeCount_ = alive;
 }
@@ -317,7 +319,7 @@ bool PathKernel::shade(int p, const Hit& hit, const SampleBlock& block) {
   PathState& path = path_[static_cast<size_t>(p)];
   PathSample& sample = sample_[static_cast<size_t>(p)];
   if (observer_) observer_->onHit(hit);
-  path.throughput *= mediaTransmittance(scene_, path.media, hit.distance);
+  if (!path.walk.medium) path.throughput *= mediaTransmittance(scene_, path.media, hit.distance);
   const MaterialSummary& material = context_.summaryOf(hit);
   if (material.special()) {
     if (material.volume && crossNullInterface(path, hit)) return path.nullCrossings < kMaxNullCrossings;
@@ -338,7 +340,7 @@ bool PathKernel::shade(int p, const Hit& hit, const SampleBlock& block) {
   if (path.segments >= plan_.settings.maxDepth) return passPane(path, hit, bsdf.straightTransmittance());
 
   const bool twoSided = (lobes & kTransmittingLobes) != 0;
-  const bool asks = aids_.guide && path.segments <= kGuidedSegments && bsdf.hasNonDelta();
+  const bool asks = aids_.guide && path.segments <= kGuidedSegments && bsdf.hasNonDelta() && !path.walk.medium;
   const GuidedBsdf guided = asks ? GuidedBsdf(bsdf, *aids_.guide, hit) : GuidedBsdf(bsdf);
   if (guided.guided()) ++guidedCount;
   if (bsdf.hasNonDelta()) sampleLights(p, hit, guided, twoSided, block, firstNonSpecular && path.featuresDone);

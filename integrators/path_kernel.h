@@ -47,6 +47,7 @@ class PathObserver {
   virtual void onRay(const PathState& path) = 0;
   virtual void onMiss() = 0;
   virtual void onHit(const Hit& hit) = 0;
+  virtual void onScattering(const PathState&) {}  // within a medium; it has the new direction
   virtual void onLight(const ShadowRay& ray, bool visible) = 0;
 };
 
@@ -65,12 +66,13 @@ class PathKernel {
         roulette_(roulette),
         wantFeatures_(plan.kept.features),
         filtered_(context.scene.accel().filtered()),
+        walk_(context.scene, sampler),
         cameraMedia_(mediaOfCamera(context.scene, plan.camera)),
         shadowRays_(context) {}
 
   // Starts a path through pixel (x, y) of the full frame with the random numbers of `key`. At most kBatch before a
   // run().
-  void start(int x, int y, uint64_t key);
+  void start(int x, int y, uint64_t key) { startAt(timeOf(x, y, key), x, y, key); }
   // Follows all started paths to their ends; their samples are then in the order of start().
   void run();
   const PathSample& sample(int i) const { return sample_[static_cast<size_t>(i)]; }
@@ -88,7 +90,6 @@ class PathKernel {
   void startAt(float time, int x, int y, uint64_t key);
   void queueRay(int slot, PathState& path);
   void traceActive();
-  void prefetchHits() const;
   void shadeActive();
   void traceShadows();
   // Hits and random numbers of all active paths whose rays hit something.
@@ -101,6 +102,8 @@ class PathKernel {
   void add(const Spectrum& radiance, bool direct, PathSample& sample) const;
   bool crossNullInterface(PathState& path, const Hit& hit) const;
   bool passPane(PathState& path, const Hit& hit, const Spectrum& weight) const;
+  // Takes a path to the end of its ray through a medium that scatters; `hit` is null where it met nothing.
+  Flight finishFlight(PathState& path, const Hit* hit) const;
   bool sampleLight(const PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided,
                    const LightChoice& choice, ShadowRay& shadow) const;
   void sampleLights(int p, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided, const SampleBlock& block,
@@ -119,6 +122,7 @@ class PathKernel {
   PathRecorder* recorder_ = nullptr;
   Roulette roulette_;
   bool wantFeatures_, filtered_;
+  RandomWalk walk_;
   MediaStack cameraMedia_;  // the solids that the camera is inside of
 
   int count_ = 0;

@@ -7,6 +7,7 @@
 #include "renderer/transport/hit.h"
 #include "renderer/transport/context.h"
 #include "renderer/transport/media.h"
+#include "renderer/transport/random_walk.h"
 
 namespace braid {
 
@@ -15,6 +16,7 @@ struct PathState {
   Spectrum throughput{1};
   MediaStack media;
   PathChannel channel;
+  WalkState walk;
   int segments = 0;       // traced so far, null interfaces not counted
   int nullCrossings = 0;  // bounds a path through degenerate nested surfaces
   int panes = 0;          // passed straight; they are no vertices
@@ -28,7 +30,7 @@ struct PathState {
   Receiver lastReceiver() const { return {lastPosition, lastNormal, lastTwoSided, time}; }
   float lastPdfW = 0;
   float lastLightSamples = 1;
-  bool lightCouldNotBeSampled = true;  // camera, delta scattering, or a null interface crossed since
+  bool lightCouldNotBeSampled = true;  // camera, delta scattering, or a null interface or a medium's event since
 
   float rouletteScale = 1;    // undoes in Russian roulette the radiance compression of refraction, and the guide
   int bounces = 0;            // scattered at the first non-specular vertex and since; up to 1 of them, light is direct

@@ -111,12 +111,20 @@ bool GradientKernel::meet(Walker& walker, const RayHit& query, PathSample& sampl
   const Spectrum before = sample.radiance;
   sample.radiance = Spectrum(0);
   bool goesOn = false;
-  if (!(query.t < kInfinity)) {
+  const bool met = query.t < kInfinity;
+  if (met) makeHit(scene_, query, walker.path.direction, walker.hit);
+  const Flight flight =
+      walker.path.walk.medium ? finishFlight(walker.path, met ? &walker.hit : nullptr) : Flight::Surface;
+  if (flight == Flight::Scattered || flight == Flight::Absorbed) {
+    // The shift replays the walk.
+    walker.arrival = Arrival::Nothing;
+    goesOn = flight == Flight::Scattered;
+  } else if (!met) {
     walker.arrival = Arrival::Sky;
     addEnvironment(walker.path, sample);
   } else {
-    makeHit(scene_, query, walker.path.direction, walker.hit);
-    walker.path.throughput *= mediaTransmittance(scene_, walker.path.media, walker.hit.distance);
+    if (!walker.path.walk.medium)
+      walker.path.throughput *= mediaTransmittance(scene_, walker.path.media, walker.hit.distance);
     if (context_.summaryOf(walker.hit).volume && crossNullInterface(walker.path, walker.hit)) {
       walker.arrival = Arrival::Nothing;
       goesOn = walker.path.nullCrossings < kMaxNullCrossings;

@@ -55,6 +55,8 @@ void PhotonEyeBatch::start(int x, int y, uint64_t key) {
 PhotonEyeBatch::Step PhotonEyeBatch::shade(int index, SubpathState& state, SubpathVertex& vertex) {
   Path& path = path_[static_cast<size_t>(index)];
   path.arrive(state);
+  // What a medium has scattered toward a broad lobe, photons bring.
+  if (path.seekingLight && state.walked) return {};
   const MaterialSummary& material = context_.summaryOf(vertex.hit);
   if (material.unlit) {
     addUnlit(index, state, vertex);
@@ -151,6 +153,7 @@ void PhotonEyeBatch::addEnvironment(int index, const SubpathState& state) {
   PathSample& sample = sample_[static_cast<size_t>(index)];
   Path& path = path_[static_cast<size_t>(index)];
   path.arrive(state);
+  if (path.seekingLight && state.walked) return;
   const Spectrum radiance =
       radianceBeyond(scene_, plan_, state.direction, state.fromCamera(), !path.featuresDone, sample);
   if (isBlack(radiance)) return;

@@ -68,7 +68,7 @@ class PhotonEyeBatch {
       // A pane that was passed was no vertex.
       if (!state.throughPane) {
         choice = choiceHere;
-        if (state.deltaRun == 0) merged2 = mergedHere2;
+        if (state.deltaSurfaces() == 0) merged2 = mergedHere2;
       }
       choiceHere = 1;
       mergedHere2 = 0;

@@ -44,8 +44,8 @@ void gatherChunks(std::vector<std::vector<PhotonType>>& chunks, std::vector<Phot
 }  // namespace
 
 bool depositsCaustic(const SubpathVertex& vertex) {
-  return vertex.deltaOnly && vertex.segments > 1 && !vertex.woBelow && vertex.bsdf.broadShare() < 1 &&
-         vertex.bsdf.restricted(LobeGroup::Narrow).hasNonDelta();
+  return vertex.deltaOnly && (vertex.segments > 1 || vertex.walked) && !vertex.woBelow &&
+         vertex.bsdf.broadShare() < 1 && vertex.bsdf.restricted(LobeGroup::Narrow).hasNonDelta();
 }
 
 uint64_t photonPaths(const Plan& plan) {

@@ -62,7 +62,7 @@ uint64_t followLightPaths(const TransportContext& context, const PhotonEmission&
 
 // Whether a light subpath's vertex is of use to gather points: light arrives on the visible side of a broad lobe.
 inline bool depositsPhoton(const SubpathVertex& vertex, int firstSegment) {
-  return vertex.segments >= firstSegment && !vertex.woBelow && vertex.bsdf.broadShare() > 0;
+  return (vertex.segments >= firstSegment || vertex.walked) && !vertex.woBelow && vertex.bsdf.broadShare() > 0;
 }
 
 // Whether light that met delta scattering alone arrives where a narrow lobe scatters it.

@@ -8,7 +8,7 @@
 #include "renderer/core/hash.h"
 #include "renderer/core/parallel.h"
 #include "renderer/core/stopwatch.h"
-#include "renderer/scene/closed_mesh.h"
+#include "renderer/scene/data/closed_mesh.h"
 #include "renderer/scene/data/placement.h"
 #include "renderer/scene/data/scene_defaults.h"
 
@@ -22,6 +22,7 @@ Scene::Scene(SceneData data, const SceneOptions& options) : data_(std::move(data
   }
   if (data_.environment) environment_.emplace(*data_.environment);
   placeMeshes();
+  findExtinctions();
   markFilteredMeshes(options.full);
   collectEmitters();
   detectTraits();
@@ -159,6 +160,21 @@ void Scene::findBounds() {
     place(instance.toWorld);
     if (instance.motion != GroupInstance::kStill)
       for (const Mat4& step : motions_[instance.motion]) place(step);
+  }
+}
+
+// Media that scatter. A mean free path is at least this share of the largest coordinate: floats resolve no shorter one,
+// and a denser medium looks alike, as its colour does not depend on its density.
+void Scene::findExtinctions() {
+  constexpr float kLeastFreePath = 0x1p-16f;
+  const float extent =
+      bounds_.empty() ? 1 : std::max(maxComponent(magnitudes(bounds_.lo)), maxComponent(magnitudes(bounds_.hi)));
+  for (Material& m : data_.materials) {
+    m.extinction = Spectrum(0);
+    if (!m.scatters()) continue;
+    for (int c = 0; c < 3; ++c)
+      m.extinction[c] = std::min(-std::log(m.attenuationColor[c]) / m.attenuationDistance,
+                                 1 / (kLeastFreePath * std::max(extent, 1e-30f)));
   }
 }
 

@@ -98,6 +98,7 @@ class Scene : private HitFilter {
   void placeMeshes();
   void placeGroups(const std::vector<uint32_t>& shared, const std::vector<std::vector<size_t>>& placements);
   void findBounds();
+  void findExtinctions();
   const GroupInstance& moveInstance(const GroupInstance& instance, float time, GroupInstance& moved) const;
   const EmissiveTriangle& moveEmitter(const EmissiveTriangle& emitter, float time, EmissiveTriangle& moved) const;
   void averageOverSteps(EmissiveTriangle& emitter) const;

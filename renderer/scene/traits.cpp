@@ -10,15 +10,25 @@
 namespace braid {
 
 std::vector<std::string> SceneTraits::names() const {
-  static const char* kNames[] = {"textures",        "normal-maps",
-                                 "alpha-mask",      "alpha-blend",
-                                 "culled-faces",    "volume",
-                                 "vertex-colors",   "texture-transforms",
-                                 "instances",       "emissive-triangles",
-                                 "point-lights",    "directional-lights",
-                                 "environment",     "environment-image",
-                                 "smooth-specular", "unlit",
-                                 "panes",           "dispersion"};
+  static const char* kNames[] = {"textures",
+                                 "normal-maps",
+                                 "alpha-mask",
+                                 "alpha-blend",
+                                 "culled-faces",
+                                 "volume",
+                                 "vertex-colors",
+                                 "texture-transforms",
+                                 "instances",
+                                 "emissive-triangles",
+                                 "point-lights",
+                                 "directional-lights",
+                                 "environment",
+                                 "environment-image",
+                                 "smooth-specular",
+                                 "unlit",
+                                 "panes",
+                                 "dispersion",
+                                 "volume-scattering"};
   std::vector<std::string> list;
   for (size_t i = 0; i < std::size(kNames); ++i)
     if (has(1u << i)) list.push_back(kNames[i]);
@@ -41,6 +51,7 @@ uint32_t materialFlags(const Material& m) {
   if (m.mayBePane()) flags |= kTraitPanes;
   if (m.hasVolume()) flags |= kTraitVolume;
   if (m.disperses()) flags |= kTraitDispersion;
+  if (m.scatters()) flags |= kTraitScattering;
   const bool smoothBase = m.roughness < 0.1f || (m.metallicRoughnessTexture && m.roughness > 0);
   if (((m.metallic > 0 || m.transmission > 0 || m.specularGlossiness) && smoothBase) ||
       (m.clearcoat > 0 && m.clearcoatRoughness < 0.1f))

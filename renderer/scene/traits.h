@@ -29,6 +29,7 @@ enum TraitFlags : uint32_t {
   kTraitUnlit = 1u << 15,
   kTraitPanes = 1u << 16,       // light may go straight on through a surface: Material::mayBePane()
   kTraitDispersion = 1u << 17,  // Material::disperses()
+  kTraitScattering = 1u << 18,  // Material::scatters()
 };
 
 struct SceneTraits {

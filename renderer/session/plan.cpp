@@ -105,6 +105,18 @@ void planIntegrators(const Scene& scene, const Settings& settings, const std::ve
   plan.lines.push_back({true, "passes of a round", shares});
 }
 
+// Solids that scatter light behind a smooth surface: a delta chain leads in, nothing connects within, another leads
+// out.
+void planSmoothSolids(const Scene& scene, Plan& plan) {
+  const SceneTraits& t = scene.traits();
+  if (!t.has(kTraitScattering) || !t.has(kTraitPointLights | kTraitDirectionalLights)) return;
+  for (const Material& m : scene.materials())
+    if (m.scatters() && m.diffuseTransmission == 0 && sqr(m.roughness) < kSmoothAlpha)
+      return plan.lines.push_back({false, "lights without size in '" + m.name + "'",
+                                   "its smooth surface lets none of them be found within: give it roughness, or "
+                                   "KHR_materials_diffuse_transmission"});
+}
+
 // The scene's parts that cost something, kept or left out.
 void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
   const SceneTraits& t = scene.traits();
@@ -126,6 +138,8 @@ void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
   part(kTraitPanes, "shadow rays through panes", "thin smooth transmissive surfaces let light straight through",
        "no thin smooth transmissive surface");
   part(kTraitVolume, "media tracking", "closed solids refract or attenuate", "no solid with a volume");
+  part(kTraitScattering, "volume scattering", "paths walk through closed solids; nothing connects to their events",
+       "no solid scatters light within");
   part(kTraitDispersion, "dispersion", "paths follow one colour from the first dispersive surface on",
        "no solid disperses light");
   part(kTraitInstances, "instance transforms",
@@ -296,6 +310,7 @@ Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& sett
   for (const PlannedIntegrator& p : plan.integrators)
     for (PlanLine& line : p.integrator->planLines(plan)) plan.lines.push_back(std::move(line));
   planSceneParts(scene, settings, plan);
+  planSmoothSolids(scene, plan);
   planMotion(scene, plan);
   planView(scene, plan);
   planPlacement(plan);

@@ -169,6 +169,20 @@ void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit
   hit.smoothNormal = hit.front ? at.ns : -at.ns;
 }
 
+void prefetchVertices(const Scene& scene, std::span<const RayHit> queries) {
+  for (const RayHit& hit : queries)
+    if (hit.t < kInfinity) __builtin_prefetch(&scene.mesh(hit.mesh).triangles[hit.triangle]);
+  for (const RayHit& hit : queries) {
+    if (!(hit.t < kInfinity)) continue;
+    const TriangleMesh& mesh = scene.mesh(hit.mesh);
+    const glm::uvec3& index = mesh.triangles[hit.triangle];
+    for (int k = 0; k < 3; ++k) {
+      __builtin_prefetch(&mesh.positions[index[k]]);
+      if (!mesh.normals.empty()) __builtin_prefetch(&mesh.normals[index[k]]);
+    }
+  }
+}
+
 Spectrum baseColorAt(const Scene& scene, const Hit& hit) {
   const Material& m = *hit.material;
   Spectrum color = m.baseColor;

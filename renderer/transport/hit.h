@@ -3,6 +3,8 @@
 // material there.
 #pragma once
 
+#include <span>
+
 #include "renderer/core/vec.h"
 #include "renderer/scene/scene.h"
 #include "renderer/transport/bsdf/surface.h"
@@ -27,6 +29,9 @@ struct Hit {
 
 // Fills `hit` from a ray query with a unit direction.
 void makeHit(const Scene& scene, const RayHit& query, const Vec3& direction, Hit& hit);
+
+// Fetches the vertices of what rays have hit while nothing waits for them.
+void prefetchVertices(const Scene& scene, std::span<const RayHit> queries);
 
 // Lifts a point off its surface, along the normal and to the side that `direction` points to, by just more than the
 // point's error bound, so that a ray from there cannot hit the surface it leaves: no fixed epsilon, so 2 cm and 1600 m

@@ -127,7 +127,8 @@ class ReachSums {
 
   Onward onHit(int index, const SubpathState& state, const SubpathVertex& vertex) {
     bool& aimless = deltaFirst_[static_cast<size_t>(index)];
-    if (vertex.segments <= 2) aimless = vertex.segments == 2 && vertex.deltaOnly;
+    if (vertex.segments == 1) aimless = vertex.walked;
+    if (vertex.segments == 2) aimless = aimless || vertex.deltaOnly;
     if (vertex.woBelow || !vertex.bsdf.hasNonDelta()) return Onward::Scatter;
     const double density = visible_.density(vertex.hit.position);
     const double light = static_cast<double>(average(vertex.throughput * vertex.bsdf.albedo())),
@@ -137,6 +138,7 @@ class ReachSums {
     const bool lamp = state.light < context_.lights.firstPositional();
     if (aimless && !lamp) {
       reach_.beyondCameraPaths += value;
+      if (state.leastPdfW == 0) reach_.throughMedia += value;  // media alone make it that
       if (vertex.deltaOnly) reach_.beyondConnections += visible_.densityOverMirrors(vertex.hit.position) * light;
     }
     addShares(state, vertex, value, lamp);
@@ -147,7 +149,7 @@ class ReachSums {
     LightReach r = reach_;
     if (total_ > 0)
       for (double* share : {&r.direct, &r.indirect, &r.caustic, &r.causticVariance, &r.unreachable,
-                            &r.beyondCameraPaths, &r.beyondConnections})
+                            &r.beyondCameraPaths, &r.beyondConnections, &r.throughMedia})
         *share /= total_;
     if (scattered_ > 0 && std::isfinite(scattered_))
       r.scatteredRadiance = scattered_ / (static_cast<double>(kPi) * kPaths * visible_.total());
@@ -156,7 +158,7 @@ class ReachSums {
 
  private:
   void addShares(const SubpathState& state, const SubpathVertex& vertex, double value, bool lamp) {
-    if (vertex.segments == 1) {
+    if (vertex.segments == 1 && !vertex.walked) {
       reach_.direct += value;
       return;
     }
@@ -177,7 +179,7 @@ class ReachSums {
   std::map<uint32_t, double> areas_;
   LightReach reach_;
   double total_ = 0, scattered_ = 0;
-  std::array<bool, kBatch> deltaFirst_{};  // of each walk: its first scattering was delta
+  std::array<bool, kBatch> deltaFirst_{};  // of each walk: its first scattering was delta, or by a medium
 };
 
 // Starts the light subpath of an item.

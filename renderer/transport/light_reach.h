@@ -21,11 +21,13 @@ struct LightReach {
   // Not a share: the radiance that all light but the direct gives to a white surface, averaged over what the camera
   // sees, W/(m² sr).
   double scatteredRadiance = 0;
-  // From points and directions, scattered first by a mirror or a smooth refraction: light sampling cannot aim over
-  // these, and nothing hits such lights, so that no camera path finds it at all.
+  // From points and directions, scattered first by a mirror, a smooth refraction or a medium: light sampling cannot aim
+  // over these, and nothing hits such lights, so that no camera path finds it at all.
   double beyondCameraPaths = 0;
-  // Of that what arrives over mirrors and through glass alone where the camera sees it in the same way: nothing can be
-  // connected, only photons find it.
+  // Of that what a medium has scattered: light samples cannot be connected to its events.
+  double throughMedia = 0;
+  // Of the light beyond camera paths, what arrives over mirrors and through glass alone where the camera sees it in the
+  // same way: nothing can be connected, only photons find it.
   double beyondConnections = 0;
 };
 

@@ -69,9 +69,16 @@ MediaStack mediaAround(const Scene& scene, const Vec3& point, const Vec3& direct
 // The solids that the camera is inside of at a time.
 MediaStack mediaOfCamera(const Scene& scene, const Camera& camera, float time = 0);
 
-// Beer-Lambert transmittance over a distance in metres (KHR_materials_volume: attenuationColor after
+// Beer-Lambert transmittance over a distance in metres, by the extinction per metre.
+inline Spectrum transmittanceAfter(const Spectrum& extinction, float distance) {
+  const Spectrum depth = extinction * distance;
+  return {std::exp(-depth.x), std::exp(-depth.y), std::exp(-depth.z)};
+}
+
+// The same of a material (KHR_materials_volume: attenuationColor after
 // attenuationDistance).
 inline Spectrum volumeTransmittance(const Material& m, float distance) {
+  if (!isBlack(m.extinction)) return transmittanceAfter(m.extinction, distance);
   if (!(m.attenuationDistance < kInfinity) || m.attenuationColor == Spectrum(1)) return Spectrum(1);
   const float x = distance / m.attenuationDistance;
   if (!std::isfinite(x)) return Spectrum(0);

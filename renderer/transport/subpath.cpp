@@ -63,7 +63,8 @@ SubpathBatch::SubpathBatch(const TransportContext& context, const PassSampler& s
       scene_(context.scene),
       sampler_(sampler),
       settings_(settings),
-      filtered_(context.scene.accel().filtered()) {}
+      filtered_(context.scene.accel().filtered()),
+      walk_(context.scene, sampler) {}
 
 void SubpathBatch::startCamera(uint64_t key, const Camera::CameraRay& ray, const MediaStack& media, double pdfPixel,
                                double lightPaths, bool orthographic) {
@@ -118,12 +119,24 @@ void SubpathBatch::startNothing() {
 }
 
 void SubpathBatch::queueRay(int slot, SubpathState& state) {
+  const float reach = walk_.any() ? walk_.begin(state) : kInfinity;
   if (filtered_) {
     const bool camera = settings_.transport == Transport::Radiance && state.fromCamera();
-    const uint32_t salt = sampler_.salt(state.key, state.block() + static_cast<uint32_t>(state.nullCrossings));
+    const uint32_t salt = sampler_.salt(state.key, state.block() + static_cast<uint32_t>(state.nullCrossings) +
+                                                       (static_cast<uint32_t>(state.walk.rays) << 12));
     state.salt = (salt & ~kCameraRay) | (camera ? kCameraRay : 0);
   }
-  rays_.set(slot, {state.origin, state.direction, kInfinity, state.salt, state.time});
+  rays_.set(slot, {state.origin, state.direction, reach, state.salt, state.time});
+}
+
+int SubpathBatch::queueAll() {
+  int active = 0;
+  for (int i = 0; i < count_; ++i) {
+    if (isBlack(state_[static_cast<size_t>(i)].throughput)) continue;
+    active_[static_cast<size_t>(active)] = i;
+    queueRay(active++, state_[static_cast<size_t>(i)]);
+  }
+  return active;
 }
 
 void SubpathBatch::trace(int active) {
@@ -139,11 +152,11 @@ void SubpathBatch::trace(int active) {
 }
 
 SubpathBatch::Arrival SubpathBatch::arrive(SubpathState& state, const Hit& hit, MisQuantities& here) const {
-  state.throughput *= mediaTransmittance(scene_, state.media, hit.distance);
+  if (!state.walk.medium) state.throughput *= mediaTransmittance(scene_, state.media, hit.distance);
   state.travelled += hit.distance;
   const MaterialSummary& material = context_.summaryOf(hit);
   if (settings_.transport == Transport::Power) {
-    if (material.unlit || !applyRange(state, hit)) return Arrival::End;
+    if (material.unlit || !applyRange(state, hit.position)) return Arrival::End;
   }
   if (settings_.mis) here = quantitiesAt(state, hit);
   if (settings_.deltaChains) state.chain /= sqr(geometricCosine(hit, hit.wo));
@@ -154,13 +167,13 @@ SubpathBatch::Arrival SubpathBatch::arrive(SubpathState& state, const Hit& hit, 
 
 // The window of a light with a range: light samples count the whole straight way to a receiver, also through panes and
 // null interfaces, so walks that go straight on replace what they have counted before. False: beyond the range.
-bool SubpathBatch::applyRange(SubpathState& state, const Hit& hit) const {
+bool SubpathBatch::applyRange(SubpathState& state, const Vec3& position) const {
   const LightSampler& lights = context_.lights;
   if (!state.straight || state.light < lights.firstPositional() || state.light >= lights.firstDirectional())
     return true;
   const PunctualLight& light = lights.positional(state.light);
   if (!(light.range < kInfinity)) return true;
-  const float window = rangeWindow(light, glm::length(hit.position - placeAt(light, hit.time).position));
+  const float window = rangeWindow(light, glm::length(position - placeAt(light, state.time).position));
   if (!(window > 0)) return false;
   state.throughput *= window / state.window;
   state.window = window;
@@ -186,6 +199,31 @@ MisQuantities SubpathBatch::quantitiesAt(const SubpathState& state, const Hit& h
   m.vc *= inverse;
   m.vm *= inverse;
   return m;
+}
+
+// A walk through a medium is one vertex that nothing connects to, like delta scattering: the first of its events is
+// that vertex, and the others change nothing more.
+Flight SubpathBatch::finishFlight(SubpathState& state, const Hit* hit) const {
+  const Flight flight = walk_.finish(state, hit);
+  if (flight != Flight::Surface) state.lightCouldNotBeSampled = true;
+  if (flight != Flight::Scattered) return flight;
+  const bool power = settings_.transport == Transport::Power;
+  state.travelled += state.walk.flight;
+  if (power && !applyRange(state, state.origin)) return Flight::Absorbed;
+  if (settings_.mis) {
+    if (power && state.atStart) {
+      state.mis.vc =
+          state.deltaLight ? 0.0 : sqr(static_cast<double>(state.cosLight) / static_cast<double>(state.pdfEmit));
+      state.mis.vm = state.mis.vc * settings_.connectWeight;
+    }
+    state.mis.vcm = 0;
+  }
+  if (!state.walked) ++state.deltaRun;
+  state.walked = true;
+  state.leastPdfW = 0;
+  state.atStart = state.throughPane = state.straight = false;
+  state.passed = 0;
+  return flight;
 }
 
 // As in the path tracer: inside of a solid that rules there, another solid's surface scatters nothing.
@@ -227,6 +265,7 @@ void SubpathBatch::finishVertex(const SubpathState& state, const Hit& hit, Subpa
   vertex.twoSided = (context_.summaryOf(hit).lobes & kTransmittingLobes) != 0;
   vertex.woBelow = !(vertex.wo.z > 0);
   vertex.deltaOnly = state.deltaOnly;
+  vertex.walked = state.walked;
 }
 
 bool SubpathBatch::scatter(SubpathState& state, const SubpathVertex& vertex) const {
@@ -292,7 +331,7 @@ bool SubpathBatch::turn(SubpathState& state, const SubpathVertex& vertex, const 
   state.lightCouldNotBeSampled = sample.delta;
   state.deltaOnly = state.deltaOnly && sample.delta;
   if (!sample.delta) state.leastPdfW = std::min(state.leastPdfW, sample.pdfW);
-  state.atStart = state.throughPane = state.straight = false;
+  state.atStart = state.throughPane = state.straight = state.walked = false;
   state.passed = 0;
   return true;
 }

@@ -6,7 +6,7 @@
 //
 // Conventions that make all ways agree:
 //   - densities per area use the geometric normals, BSDF cosines the shading normals;
-//   - delta scattering and null interfaces (media.h) are vertices that no one can connect to;
+//   - delta scattering, null interfaces (media.h) and walks through media are vertices that no one can connect to;
 //   - a pane is no vertex for light that goes straight on through it: neither densities nor lengths of paths know of
 //     it, and shadow rays pass it too (visibility.h). It is an ordinary vertex for all else that its surface does;
 //   - the light side must see a surface from the same side by both normals, as for light samples of a path tracer; a
@@ -23,6 +23,7 @@
 #include "renderer/transport/context.h"
 #include "renderer/transport/dispersion.h"
 #include "renderer/transport/light_emission.h"
+#include "renderer/transport/random_walk.h"
 #include "renderer/transport/roulette.h"
 #include "renderer/transport/visibility.h"
 
@@ -58,6 +59,7 @@ struct SubpathVertex {
   float travelled = 0;     // metres since the start of the walk
   bool woBelow = false;    // wo lies below the horizon of the shading normal
   bool deltaOnly = false;  // everything since the start of the walk was delta
+  bool walked = false;     // a medium has scattered it since the last vertex, or since the start
 
   SubpathVertex(const SurfaceParameters& p, const Vec3& o, Transport t) : bsdf(p, o, t), wo(o) {}
   SubpathVertex(const Spectrum& albedo, const Vec3& o) : bsdf(albedo, o), wo(o) {}
@@ -83,6 +85,7 @@ struct SubpathState {
   Spectrum throughput{1};
   MediaStack media;
   PathChannel channel;
+  WalkState walk;
   MisQuantities mis;
   uint64_t key = 0;
   int segments = 1;  // including the ray that is under way
@@ -97,7 +100,10 @@ struct SubpathState {
   float etaScale = 1;
   bool byDistance = true;  // densities of the first hit depend on its distance: not for parallel rays
   bool deltaOnly = true;
-  int deltaRun = 0;  // delta scattering events since the last other one, or since the start
+  bool walked = false;  // a medium has scattered it since the last vertex; counts as one delta scattering event
+  int deltaRun = 0;     // delta scattering events since the last other one, or since the start
+  // Of those, the ones by surfaces.
+  int deltaSurfaces() const { return deltaRun - (walked ? 1 : 0); }
   // Squared density of finding the other end of such a run from there, over that of walking it from here: (cos / pdf)²
   // of what it began with, times the squared ratios of cosines at its vertices. The squared density with which a walk
   // starts at the other end, pdfEmit or that of a BSDF, remains to be multiplied with.
@@ -160,12 +166,16 @@ class SubpathBatch {
  private:
   enum class Arrival { End, Null, Vertex };
   void queueRay(int slot, SubpathState& state);
+  // Begins all walks that carry anything; returns their number.
+  int queueAll();
   // Traces the rays of all active walks and fills hits_.
   void trace(int active);
+  // Takes a walk to the end of its ray through a medium that scatters; `hit` is null where it met nothing.
+  Flight finishFlight(SubpathState& state, const Hit* hit) const;
   // Brings the walk to a hit: attenuation. `here`: the quantities there, state.mis stays that of the departing ray.
   Arrival arrive(SubpathState& state, const Hit& hit, MisQuantities& here) const;
   MisQuantities quantitiesAt(const SubpathState& state, const Hit& hit) const;
-  bool applyRange(SubpathState& state, const Hit& hit) const;
+  bool applyRange(SubpathState& state, const Vec3& position) const;
   void finishVertex(const SubpathState& state, const Hit& hit, SubpathVertex& vertex) const;
   bool scatter(SubpathState& state, const SubpathVertex& vertex) const;
   // Goes on in a sampled direction.
@@ -178,6 +188,7 @@ class SubpathBatch {
   const PassSampler& sampler_;
   WalkSettings settings_;
   bool filtered_;
+  RandomWalk walk_;
   int count_ = 0;
   std::array<SubpathState, kBatch> state_;
   std::array<int, kBatch> active_;
@@ -188,23 +199,25 @@ class SubpathBatch {
 
 template <class OnHit, class OnMiss>
 void SubpathBatch::run(const OnHit& onHit, const OnMiss& onMiss) {
-  int active = 0;
-  for (int i = 0; i < count_; ++i) {
-    if (isBlack(state_[static_cast<size_t>(i)].throughput)) continue;
-    active_[static_cast<size_t>(active)] = i;
-    queueRay(active++, state_[static_cast<size_t>(i)]);
-  }
-  while (active > 0) {
+  for (int active = queueAll(); active > 0;) {
     trace(active);
     int alive = 0;
+    const auto goOn = [&](int index) {
+      active_[static_cast<size_t>(alive)] = index;
+      queueRay(alive++, state_[static_cast<size_t>(index)]);
+    };
     for (int a = 0; a < active; ++a) {
       const int index = active_[static_cast<size_t>(a)];
       SubpathState& state = state_[static_cast<size_t>(index)];
-      if (!(queries_[static_cast<size_t>(a)].t < kInfinity)) {
+      const Hit& hit = hits_[static_cast<size_t>(a)];
+      const bool met = queries_[static_cast<size_t>(a)].t < kInfinity;
+      const Flight flight = state.walk.medium ? finishFlight(state, met ? &hit : nullptr) : Flight::Surface;
+      if (flight == Flight::Scattered) goOn(index);
+      if (flight == Flight::Scattered || flight == Flight::Absorbed) continue;
+      if (!met) {
         onMiss(index, state);
         continue;
       }
-      const Hit& hit = hits_[static_cast<size_t>(a)];
       MisQuantities here;
       const Arrival arrival = arrive(state, hit, here);
       if (arrival == Arrival::End) continue;
@@ -221,12 +234,10 @@ void SubpathBatch::run(const OnHit& onHit, const OnMiss& onMiss) {
         Onward onward = onHit(index, state, vertex);
         if (onward == Onward::End) continue;
         if (state.segments >= settings_.maxSegments) onward = Onward::Pass;
-        const bool goesOn =
-            onward == Onward::Pass ? pass(state, hit, vertex.bsdf.straightTransmittance()) : scatter(state, vertex);
-        if (!goesOn) continue;
+        if (!(onward == Onward::Pass ? pass(state, hit, vertex.bsdf.straightTransmittance()) : scatter(state, vertex)))
+          continue;
       }
-      active_[static_cast<size_t>(alive)] = index;
-      queueRay(alive++, state);
+      goOn(index);
     }
     active = alive;
   }

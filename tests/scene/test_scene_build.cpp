@@ -3,7 +3,7 @@
 #include <doctest/doctest.h>
 
 #include "integrators/registry.h"
-#include "renderer/scene/closed_mesh.h"
+#include "renderer/scene/data/closed_mesh.h"
 #include "renderer/session/session.h"
 #include "renderer/transport/hit.h"
 #include "tools/bench/builtin_scenes.h"

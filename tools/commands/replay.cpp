@@ -53,6 +53,9 @@ class PrintingObserver final : public PathObserver {
                place(hit.position, scene_.data().origin), hit.distance, hit.front ? "front" : "back",
                show(hit.frame.n));
   }
+  void onScattering(const PathState& path) override {
+    fmt::print("   is scattered within '{}', {:.6g} m away\n", path.walk.medium->name, path.walk.flight);
+  }
   void onLight(const ShadowRay& ray, bool visible) override {
     fmt::print("   light sample along {}: {} {}\n", show(ray.ray.direction), visible ? "adds" : "hidden, would add",
                show(ray.contribution));

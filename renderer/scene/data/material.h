@@ -60,6 +60,11 @@ struct Material {
   Spectrum attenuationColor{1};
   float attenuationDistance = kInfinity;  // metres
 
+  // KHR_materials_volume_scatter
+  Spectrum scatterAlbedo{0};    // of a single event: the part of the attenuation that only turns light
+  float scatterAnisotropy = 0;  // mean cosine g of Henyey and Greenstein, in (-1, 1)
+  Spectrum extinction{0};       // per metre, of a medium that scatters; Scene works it out
+
   float diffuseTransmission = 0;
   TextureRef diffuseTransmissionTexture;  // A
   Spectrum diffuseTransmissionColor{1};
@@ -95,6 +100,9 @@ struct Material {
   bool emissive() const { return maxComponent(emission) > 0; }
   bool transmissive() const { return transmission > 0; }
   bool hasVolume() const { return !thinWalled && (transmissive() || diffuseTransmission > 0); }
+  bool scatters() const {
+    return hasVolume() && !isBlack(scatterAlbedo) && attenuationDistance < kInfinity && attenuationColor != Spectrum(1);
+  }
   bool disperses() const { return dispersion > 0 && ior > 1 && !thinWalled && transmissive() && !specularGlossiness; }
   // Refractive index of a colour channel, by the formula of KHR_materials_dispersion for its lines C (656.3 nm, red),
   // d (587.6 nm, green) and F (486.1 nm, blue). Without a channel (3), that of the line d.

@@ -9,6 +9,7 @@
 #include "renderer/scene/gltf/gltf_material.h"
 #include "renderer/scene/gltf/gltf_nodes.h"
 #include "renderer/scene/gltf/poses/gltf_pose.h"
+#include "renderer/scene/data/closed_mesh.h"
 #include "renderer/scene/data/scene_defaults.h"
 
 namespace braid {
@@ -31,6 +32,15 @@ void addDefaults(SceneData& scene, const LoadOptions& options, Report& report) {
     report.warn("", std::string(dark ? "the lights of the file emit nothing" : "the file has no light") + "; " +
                         describeDefaultLight(options.defaultLight));
   }
+}
+
+// A walk ends at the surface of its solid, so that there must be one all around.
+void checkSolids(const SceneData& scene, Report& report) {
+  for (const TriangleMesh& mesh : scene.meshes)
+    if (scene.materials[mesh.material].scatters() && !isClosedOutward(mesh))
+      report.warn("",
+                  "a mesh whose material scatters light within (KHR_materials_volume_scatter) is not closed by "
+                  "itself, front faces outward; where nothing closes it, what scatters fills the scene's bounds");
 }
 
 SceneData describe(const Document& document) {
@@ -112,6 +122,7 @@ SceneData SceneFile::pose(std::optional<float> frameTime) {
   MaterialTable materials(document, scene, options.doubleSided);
   buildScene(document, options, materials, scene);
   materials.loadTextures();
+  checkSolids(scene, document.report);
   if (options.strict) document.report.throwIfBroken(document.path);
   // A file that never had a surface is no flaw; one that lost them all has nothing to show.
   if (scene.instances.empty()) {

@@ -31,6 +31,18 @@ float factor(const Value& object, const char* name, double fallback) {
   return static_cast<float>(number(object, name, fallback));
 }
 
+// Beyond it nearly all light goes straight on, or straight back, and floats tell no more directions.
+constexpr float kMostAnisotropy = 0.9999f;
+
+// Albedo of one event in a dense medium that looks of this colour after many (KHR_materials_volume_scatter; Kulla and
+// Conty 2017, "Revisiting Physically Based Shading at Imageworks"). The fit leaves black a little, which is nothing.
+float singleScatteringAlbedo(float color) {
+  if (!(color > 0)) return 0;
+  const auto c = static_cast<double>(color);
+  const double s = 4.09712 + 4.20863 * c - std::sqrt(9.59217 + 41.6808 * c + 17.7126 * c * c);
+  return static_cast<float>(std::clamp(1 - s * s, 0.0, 1.0));
+}
+
 // u' = T R S u with the rotation of the extension: counter-clockwise in an image whose v axis points down.
 void readTransform(const Value& json, TextureRef& ref) {
   if (!json.IsObject()) return;
@@ -57,6 +69,7 @@ class MaterialReader {
     surface(m, source, place);
     dielectric(m, source.extensions, place);
     transmission(m, source.extensions, place);
+    scattering(m, source.extensions, place);
     coatAndSheen(m, source.extensions);
     anisotropyAndIridescence(m, source.extensions);
     return m;
@@ -172,6 +185,29 @@ class MaterialReader {
     m.diffuseTransmissionTexture = texture(diffuse, "diffuseTransmissionTexture");
     m.diffuseTransmissionColor = colour(diffuse, "diffuseTransmissionColorFactor", Spectrum(1));
     m.diffuseTransmissionColorTexture = texture(diffuse, "diffuseTransmissionColorTexture");
+  }
+
+  void scattering(Material& m, const tinygltf::ExtensionMap& extensions, const std::string& place) const {
+    const Value& scatter = member(extensions, "KHR_materials_volume_scatter");
+    if (!scatter.IsObject()) return;
+    const std::string at = place + "/extensions/KHR_materials_volume_scatter";
+    // The factor's name in older drafts.
+    const Spectrum older = colour(scatter, "multiscatterColor", Spectrum(0));
+    const Spectrum color = colour(scatter, "multiscatterColorFactor", older);
+    m.scatterAlbedo = {singleScatteringAlbedo(color.x), singleScatteringAlbedo(color.y),
+                       singleScatteringAlbedo(color.z)};
+    m.scatterAnisotropy = factor(scatter, "scatterAnisotropy", 0);
+    if (std::fabs(m.scatterAnisotropy) > kMostAnisotropy) {
+      document_.report.warn(at + "/scatterAnisotropy", "is not between -1 and 1; 0.9999 of its sign is used");
+      m.scatterAnisotropy = std::copysign(kMostAnisotropy, m.scatterAnisotropy);
+    }
+    if (index(member(scatter, "multiscatterColorTexture"), "index") >= 0)
+      document_.report.warn(at + "/multiscatterColorTexture",
+                            "is not read, as a medium has one colour; the factor alone is used");
+    if (!isBlack(color) && !m.scatters())
+      document_.report.warn(at,
+                            "scattering needs transmission or diffuse transmission, a volume with a "
+                            "thicknessFactor above 0, and its attenuation; it has no effect");
   }
 
   void coatAndSheen(Material& m, const tinygltf::ExtensionMap& extensions) const {

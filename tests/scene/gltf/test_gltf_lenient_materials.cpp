@@ -90,6 +90,40 @@ TEST_CASE("lenient: materials keep what can be read of them") {
   CHECK(loadWarned(none, "/meshes/0/primitives/0/material: is 3").materials.at(0).name == "default");
 }
 
+TEST_CASE("lenient: media that scatter where they can, and say where they cannot") {
+  GltfFile file = quadFile();
+  const int texture = addTexture(file);
+  const auto scene = [&](const Json& scatter, const Json& volume) {
+    GltfFile one = file;
+    giveMaterial(one, {{"extensions",
+                        {{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
+                         {"KHR_materials_volume", volume},
+                         {"KHR_materials_volume_scatter", scatter}}}});
+    return one.load();
+  };
+  const Json volume = {{"thicknessFactor", 1}, {"attenuationColor", {0.5, 0.5, 0.5}}, {"attenuationDistance", 1}};
+  const std::string at = "/materials/0/extensions/KHR_materials_volume_scatter";
+  const SceneData sheet = scene({{"multiscatterColorFactor", {2, 0.5, 0.5}}, {"scatterAnisotropy", 1}}, volume);
+  CHECK(hasWarning(sheet, at + "/multiscatterColorFactor"));
+  CHECK(hasWarning(sheet, at + "/scatterAnisotropy: is not between -1 and 1"));
+  CHECK(hasWarning(sheet, "is not closed by itself"));
+  CHECK(sheet.materials.at(0).scatterAnisotropy == 0.9999f);
+  CHECK(sheet.materials.at(0).scatterAlbedo.x == 1);
+  CHECK(scene({{"multiscatterColorFactor", {1, 1, 1}}, {"scatterAnisotropy", -3}}, volume)
+            .materials.at(0)
+            .scatterAnisotropy == -0.9999f);
+  CHECK(hasWarning(scene({{"multiscatterColorTexture", {{"index", texture}}}}, volume),
+                   at + "/multiscatterColorTexture: is not read"));
+  const Json color = {{"multiscatterColorFactor", {0.5, 0.5, 0.5}}};
+  for (const Json& nothing : {Json::object(), Json{{"thicknessFactor", 0}, {"attenuationColor", {0.5, 0.5, 0.5}}},
+                              Json{{"thicknessFactor", 1}}}) {
+    const SceneData none = scene(color, nothing);
+    CHECK(hasWarning(none, at + ": scattering needs transmission"));
+    CHECK_FALSE(none.materials.at(0).scatters());
+    CHECK_FALSE(hasWarning(none, "is not closed"));
+  }
+}
+
 TEST_CASE("lenient: samplers, and sets of texture coordinates") {
   GltfFile file = quadFile();
   SUBCASE("unknown wrap modes repeat") {

@@ -68,6 +68,28 @@ TEST_CASE("gltf: material extensions of light that passes through") {
   CHECK(leaf.diffuseTransmissionColor == Spectrum(0, 1, 0));
 }
 
+TEST_CASE("gltf: a colour after many events becomes the albedo of one") {
+  const auto solid = [](const Json& scatter) {
+    return loadMaterial(
+        {{"extensions",
+          {{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
+           {"KHR_materials_volume",
+            {{"thicknessFactor", 1}, {"attenuationColor", {0.5, 0.6, 0.7}}, {"attenuationDistance", 2}}},
+           {"KHR_materials_volume_scatter", scatter}}}});
+  };
+  const Material m = solid({{"multiscatterColorFactor", {0, 0.5, 1}}, {"scatterAnisotropy", -0.25}});
+  CHECK(m.scatters());
+  CHECK(m.scatterAnisotropy == -0.25f);
+  CHECK(m.scatterAlbedo.x == 0);
+  CHECK(m.scatterAlbedo.y == doctest::Approx(0.911709).epsilon(1e-5));  // the formula, worked out by hand
+  CHECK(m.scatterAlbedo.z == 1);
+  // The name of older drafts; the newer one wins.
+  CHECK(solid({{"multiscatterColor", {0, 0.5, 1}}}).scatterAlbedo == m.scatterAlbedo);
+  CHECK(solid({{"multiscatterColor", {1, 1, 1}}, {"multiscatterColorFactor", {0, 0.5, 1}}}).scatterAlbedo ==
+        m.scatterAlbedo);
+  CHECK_FALSE(solid(Json::object()).scatters());
+}
+
 TEST_CASE("gltf: material extensions of reflection") {
   const Material specular = loadMaterial(
       withExtension("KHR_materials_specular", {{"specularFactor", 0.5}, {"specularColorFactor", {2, 1, 0}}}));

@@ -70,6 +70,8 @@ constexpr Field kSpecular[] = {factor("specularFactor"), object("specularTexture
 constexpr Field kTransmission[] = {factor("transmissionFactor"), object("transmissionTexture", kTexture)};
 constexpr Field kVolume[] = {factor("thicknessFactor", 0, kMost), object("thicknessTexture", kTexture),
                              colour("attenuationColor"), real("attenuationDistance")};
+constexpr Field kVolumeScatter[] = {colour("multiscatterColorFactor"), colour("multiscatterColor"),
+                                    object("multiscatterColorTexture", kTexture), factor("scatterAnisotropy", -1, 1)};
 constexpr Field kDiffuseTransmission[] = {
     factor("diffuseTransmissionFactor"), object("diffuseTransmissionTexture", kTexture),
     colour("diffuseTransmissionColorFactor"), object("diffuseTransmissionColorTexture", kTexture)};
@@ -98,7 +100,8 @@ constexpr Field kMaterialExtensions[] = {object("KHR_materials_anisotropy", kAni
                                          object("KHR_materials_specular", kSpecular),
                                          object("KHR_materials_transmission", kTransmission),
                                          object("KHR_materials_unlit", {}),
-                                         object("KHR_materials_volume", kVolume)};
+                                         object("KHR_materials_volume", kVolume),
+                                         object("KHR_materials_volume_scatter", kVolumeScatter)};
 constexpr Field kMaterial[] = {text("name"),
                                object("pbrMetallicRoughness", kMetallicRoughness),
                                object("normalTexture", kTexture),

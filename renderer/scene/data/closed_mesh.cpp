@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "renderer/scene/closed_mesh.h"
+#include "renderer/scene/data/closed_mesh.h"
 
 #include <algorithm>
 #include <cstring>
