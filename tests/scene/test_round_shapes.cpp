@@ -5,7 +5,7 @@
 
 #include <doctest/doctest.h>
 
-#include "renderer/scene/closed_mesh.h"
+#include "renderer/scene/data/closed_mesh.h"
 #include "renderer/scene/data/round_shapes.h"
 #include "tests/support/gltf_fixture.h"
 #include "tests/support/render_fixture.h"
