@@ -49,14 +49,14 @@ SceneData cabinet(float roughness) {
   opal.attenuationColor = {0.7f, 0.2f, 0.9f};
   opal.scatterAnisotropy = 0.6f;
   mist.scatterAnisotropy = -0.4f;
-  addWith(data, ball(0.3f, {-0.5f, 0.55f, 0.4f}), candle);
-  addWith(data, ball(0.3f, {0.45f, 0, 0.4f}), opal);
-  addWith(data, boxMesh({-0.2f, 0.4f, -0.3f}, {0.3f, 0.8f, 0.1f}), mist);
+  addSolid(data, ball(0.3f, {-0.5f, 0.55f, 0.4f}), candle);
+  addSolid(data, ball(0.3f, {0.45f, 0, 0.4f}), opal);
+  addSolid(data, boxMesh({-0.2f, 0.4f, -0.3f}, {0.3f, 0.8f, 0.1f}), mist);
   Material lamp = diffuseMaterial(Spectrum(0.5f), Spectrum(4, 5, 6));
   lamp.doubleSided = true;
   TriangleMesh panel;
   addQuad(panel, {-0.05f, 0.5f, -0.1f}, {0.2f, 0, 0}, {0, 0.2f, 0});
-  addWith(data, panel, lamp);
+  addSolid(data, panel, lamp);
   return data;
 }
 
@@ -168,7 +168,7 @@ TEST_CASE("volume scattering: all integrators agree on wax, filled glass and a l
 TEST_CASE("volume scattering: a point light within wax is found by subpaths from it, and told to be missed by pt") {
   SceneData data = cornellBox();
   for (Material& m : data.materials) m.emission = Spectrum(0);
-  addWith(data, ball(0.3f, {0, 0.1f, 0.4f}), wax(Spectrum(0.95f), 0.1f));
+  addSolid(data, ball(0.3f, {0, 0.1f, 0.4f}), wax(Spectrum(0.95f), 0.1f));
   PunctualLight point;
   point.position = {0.05f, 0.1f, 0.4f};
   point.intensity = Spectrum(3);

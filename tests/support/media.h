@@ -44,7 +44,7 @@ inline TriangleMesh boxMesh(const Vec3& lo, const Vec3& hi) {
   return mesh;
 }
 
-inline void addWith(SceneData& data, TriangleMesh mesh, const Material& material) {
+inline void addSolid(SceneData& data, TriangleMesh mesh, const Material& material) {
   data.materials.push_back(material);
   addMesh(data, std::move(mesh), static_cast<uint32_t>(data.materials.size() - 1));
 }
@@ -52,7 +52,7 @@ inline void addWith(SceneData& data, TriangleMesh mesh, const Material& material
 // A solid alone in an environment of radiance 1.
 inline SceneData inWhite(const Material& material, TriangleMesh mesh, const CameraData& camera) {
   SceneData data;
-  addWith(data, std::move(mesh), material);
+  addSolid(data, std::move(mesh), material);
   data.environment = EnvironmentData{nullptr, Spectrum(1), 0};
   data.cameras = {camera};
   return data;
