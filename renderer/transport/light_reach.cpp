@@ -139,15 +139,15 @@ class ReachSums {
       reach_.beyondCameraPaths += value;
       if (vertex.deltaOnly) reach_.beyondConnections += visible_.densityOverMirrors(vertex.hit.position) * light;
     }
-    addShares(state, vertex, value, lamp);
+    addShares(state, vertex, light, value, lamp);
     return Onward::Scatter;
   }
 
   LightReach result() const {
     LightReach r = reach_;
     if (total_ > 0)
-      for (double* share : {&r.direct, &r.indirect, &r.caustic, &r.causticVariance, &r.unreachable,
-                            &r.beyondCameraPaths, &r.beyondConnections})
+      for (double* share : {&r.direct, &r.indirect, &r.caustic, &r.causticOverMirrors, &r.causticVariance,
+                            &r.unreachable, &r.beyondCameraPaths, &r.beyondConnections})
         *share /= total_;
     if (scattered_ > 0 && std::isfinite(scattered_))
       r.scatteredRadiance = scattered_ / (static_cast<double>(kPi) * kPaths * visible_.total());
@@ -155,7 +155,7 @@ class ReachSums {
   }
 
  private:
-  void addShares(const SubpathState& state, const SubpathVertex& vertex, double value, bool lamp) {
+  void addShares(const SubpathState& state, const SubpathVertex& vertex, double light, double value, bool lamp) {
     if (vertex.segments == 1) {
       reach_.direct += value;
       return;
@@ -167,6 +167,7 @@ class ReachSums {
       return;
     }
     reach_.caustic += value;
+    reach_.causticOverMirrors += visible_.densityOverMirrors(vertex.hit.position) * light;
     if (!lamp) reach_.unreachable += value;
     const double area = lamp ? areas_.at(context_.scene.emitters()[state.light].mesh) : 0;
     reach_.causticVariance += value / chanceToHit(area, state.travelled);
