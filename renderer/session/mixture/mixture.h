@@ -22,7 +22,7 @@ struct PilotMeasure {
   bool unbiased = true;
   double cost = 0;    // of a pass, in rays a pixel
   double passes = 0;  // of the pilot
-  double hidden = 0;  // squared relative error by light that so few passes need not meet, where nothing else finds it
+  double hidden = 0;  // squared relative error by light that so few passes need not meet, alone
   std::vector<PilotBlock> blocks;
 };
 
