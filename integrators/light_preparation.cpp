@@ -39,9 +39,11 @@ Applies photonsApply(const SceneTraits& traits, const LightReach& reach) {
   if (!traits.has(kTraitEmissiveTriangles | kTraitPointLights | kTraitDirectionalLights))
     return {false, "only the environment lights the scene: camera paths find it"};
   if (reach.causticVariance > kCausticVariance)
-    return {true, fmt::format("caustics are {:.2g} % of the light in view and would give camera paths {:.2g} times the "
-                              "variance of all the rest",
-                              100 * reach.caustic, reach.causticVariance)};
+    return {true,
+            fmt::format("caustics are {:.2g} % of the light in view and would give camera paths {:.2g} times the "
+                        "variance of all the rest",
+                        100 * reach.caustic, reach.causticVariance),
+            true};
   return {false, fmt::format("no caustics to speak of ({:.2g} % of the light in view), and camera paths find the rest",
                              100 * reach.caustic)};
 }
@@ -55,11 +57,15 @@ Applies connectionsApply(const SceneTraits& traits, const LightReach& reach) {
   Applies photons = photonsApply(traits, reach);
   if (!photons.yes || reach.caustic >= kCausticShare) return photons;
   if (reach.unreachable >= kUnreachableShare)
-    return {true, fmt::format("caustics of lights without size are {:.2g} % of the light in view: no camera path finds "
-                              "them",
-                              100 * reach.unreachable)};
-  return {false, fmt::format("caustics are only {:.2g} % of the light in view: photons beside camera paths cost less",
-                             100 * reach.caustic)};
+    return {true,
+            fmt::format("caustics of lights without size are {:.2g} % of the light in view: no camera path finds "
+                        "them",
+                        100 * reach.unreachable),
+            true};
+  return {false,
+          fmt::format("caustics are only {:.2g} % of the light in view: photons beside camera paths cost less",
+                      100 * reach.caustic),
+          true};
 }
 
 }  // namespace braid

@@ -18,8 +18,8 @@ class PathTracer final : public Integrator {
     return "path tracing, next-event estimation and BSDF sampling with the power heuristic";
   }
   Applies applies(const SceneTraits& traits, const LightReach& reach) const override {
-    if (connectionsApply(traits, reach).yes) return {false, "bdpt has all its ways to find light, and more"};
-    return {true, "unbiased for every scene"};
+    if (connectionsApply(traits, reach).yes) return {false, "bdpt has all its ways to find light, and more", true};
+    return {true, "unbiased for every scene", photonsApply(traits, reach).open};
   }
   double misses(const LightReach& reach) const override { return reach.beyondCameraPaths; }
 

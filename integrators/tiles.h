@@ -8,7 +8,7 @@
 namespace braid {
 
 struct TileCounts {
-  uint64_t paths = 0, rays = 0, shadowRays = 0;
+  uint64_t paths = 0, rays = 0, shadowRays = 0, photons = 0;
 };
 
 // Calls render(tile, record) for every tile of the plan's window, in full-frame pixels. Returns false when cancelled.
@@ -35,6 +35,7 @@ bool forEachTile(const PassRequest& request, const Render& render) {
       request.statistics->paths += counts.paths;
       request.statistics->rays += counts.rays;
       request.statistics->shadowRays += counts.shadowRays;
+      request.statistics->photons += counts.photons;
     }
   });
   return !cancelled;

@@ -93,7 +93,7 @@ bool PhotonMapper::renderPass(const PassRequest& request, PassTarget& target) co
           const float scale = clamp > 0 && largest > clamp ? clamp / largest : 1.0f;
           target.bias(x - plan.window.x0, y - plan.window.y0, batch.bias(i) * scale);
         });
-    return TileCounts{pixelCount(tile), batch.rayCount(), batch.shadowRayCount};
+    return TileCounts{pixelCount(tile), batch.rayCount(), batch.shadowRayCount, batch.photonCount};
   });
 }
 

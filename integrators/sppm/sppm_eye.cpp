@@ -99,6 +99,7 @@ PhotonEyeBatch::Step PhotonEyeBatch::shade(int index, SubpathState& state, Subpa
 void PhotonEyeBatch::addGathered(int index, const SubpathVertex& vertex, const PhotonSum& sum, double lightPaths,
                                  float radius) {
   const GatheredLight light = gatheredLight(sum, lightPaths, radius);
+  photonCount += sum.photons;
   sample_[static_cast<size_t>(index)].radiance += vertex.throughput * light.radiance;
   bias_[static_cast<size_t>(index)] += vertex.throughput * light.bias;
 }

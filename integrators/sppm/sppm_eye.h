@@ -44,6 +44,7 @@ class PhotonEyeBatch {
   void clear();
   uint64_t rayCount() const { return walks_.rayCount; }
   uint64_t shadowRayCount = 0;
+  uint64_t photonCount = 0;  // that gathers found
 
  private:
   struct Step {

@@ -22,11 +22,13 @@ namespace braid {
 struct Applies {
   bool yes = true;
   std::string reason;
+  bool open = false;  // a pilot may find otherwise (renderer/session/integrator_choice.cpp)
 };
 
 // Counts of one pass, for reports. Sums over tiles; order does not matter.
 struct PassStatistics {
   std::atomic<uint64_t> paths{0}, rays{0}, shadowRays{0};
+  std::atomic<uint64_t> photons{0};        // that gathers found
   std::atomic<int64_t> rejectedPixel{-1};  // y · frame width + x of one rejected sample
 };
 

@@ -17,94 +17,6 @@ namespace braid {
 
 namespace {
 
-// From this share of the light in view on, what cannot be found is told.
-constexpr double kMissedLight = 0.01;
-
-// Whether some of the light of points and directions may be scattered by mirrors or smooth refraction first.
-bool mayMissLight(const SceneTraits& t) {
-  return t.has(kTraitPointLights | kTraitDirectionalLights) &&
-         t.hasLobe(kLobeSpecular | kLobeTransmission | kLobeClearcoat);
-}
-
-// Alpha of shadows follows from the light that camera paths find: what light paths bring has none.
-bool wantsShadowAlpha(const Scene& scene, const Settings& s) { return scene.data().ground && s.transparent; }
-bool hasShadowAlpha(const Integrator& i) {
-  const std::string_view name = i.name();
-  return name == "pt" || name == "crn";
-}
-
-// Whether `auto` runs it.
-Applies appliesHere(const Integrator& i, const Scene& scene, const Settings& settings, const LightReach& reach) {
-  if (!wantsShadowAlpha(scene, settings)) return i.applies(scene.traits(), reach);
-  if (!hasShadowAlpha(i)) return {false, "has no alpha of shadows (--ground --transparent)"};
-  if (i.name() == std::string_view("pt")) return {true, "its paths know the alpha of shadows (--ground --transparent)"};
-  return i.applies(scene.traits(), reach);
-}
-
-void planUnreachable(const LightReach& reach, bool shadowAlpha, Plan& plan) {
-  double missed = 1;
-  std::string names;
-  for (const PlannedIntegrator& p : plan.integrators) {
-    missed = std::min(missed, p.integrator->misses(reach));
-    names += fmt::format("{}{}", names.empty() ? "" : ", ", p.integrator->name());
-  }
-  if (plan.integrators.empty() || missed < kMissedLight) return;
-  plan.unreachable = fmt::format(
-      "{:.3g} % of the light in view comes from lights without size over mirrors or through solids that refract, where "
-      "{} cannot find it: --integrator auto can{}",
-      100 * missed, names, shadowAlpha ? ", without --transparent" : "");
-  plan.lines.push_back({false, "light out of reach", plan.unreachable});
-}
-
-void planIntegrators(const Scene& scene, const Settings& settings, const std::vector<const Integrator*>& available,
-                     Plan& plan) {
-  LightReach reach;
-  const bool automatic =
-      std::find(settings.integrators.begin(), settings.integrators.end(), "auto") != settings.integrators.end();
-  if (automatic || mayMissLight(scene.traits()))
-    reach = measureLightReach(TransportContext(scene, settings.lightStrategy), plan.camera, settings.width,
-                              settings.height);
-  const bool shadowAlpha = wantsShadowAlpha(scene, settings);
-  std::string known;
-  for (const Integrator* i : available) known += fmt::format("{}{}", known.empty() ? "" : ", ", i->name());
-  for (const std::string& name : settings.integrators) {
-    bool found = false;
-    for (const Integrator* i : available) {
-      if (name != "auto" && name != i->name()) continue;
-      found = true;
-      const bool possible = !shadowAlpha || hasShadowAlpha(*i);
-      if (name != "auto" && !possible)
-        throw Error(ExitCode::Usage,
-                    "--ground --transparent: " + name + " has no alpha of shadows: use --integrator auto or pt");
-      const bool planned = std::any_of(plan.integrators.begin(), plan.integrators.end(),
-                                       [&](const PlannedIntegrator& p) { return p.integrator == i; });
-      if (planned) continue;
-      // An integrator asked for by name runs even where the scene does not need it; how light reaches what is in view
-      // is not measured for it.
-      const Applies applies =
-          name == "auto" ? appliesHere(*i, scene, settings, reach) : Applies{true, "as --integrator says"};
-      const bool kept = applies.yes || (settings.full && possible);
-      plan.lines.push_back({kept, i->name(), applies.reason});
-      if (kept) plan.integrators.push_back({i, 1});
-    }
-    if (!found) throw Error(ExitCode::Usage, "unknown integrator '" + name + "': known are auto, " + known);
-  }
-  planUnreachable(reach, shadowAlpha, plan);
-  if (plan.integrators.size() < 2) return;
-  // The first one is the headline when nothing combines them. Photons are kept where unbiased images are led by
-  // fireflies.
-  const bool chosen = settings.integrators == std::vector<std::string>{"auto"};
-  if (chosen)
-    std::stable_partition(plan.integrators.begin(), plan.integrators.end(),
-                          [](const PlannedIntegrator& p) { return !p.integrator->unbiased(); });
-  plan.lines.push_back(
-      {true, "headline", fmt::format("{}, unless a combiner makes it", plan.integrators[0].integrator->name())});
-  std::string shares;
-  for (const PlannedIntegrator& p : plan.integrators)
-    shares += fmt::format("{}{} {}", shares.empty() ? "" : ", ", p.integrator->name(), p.passesPerRound);
-  plan.lines.push_back({true, "passes of a round", shares});
-}
-
 // Solids that scatter light behind a smooth surface: a delta chain leads in, nothing connects within, another leads
 // out.
 void planSmoothSolids(const Scene& scene, Plan& plan) {
@@ -162,7 +74,7 @@ void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
 }
 
 void requireShadowAlpha(const Scene& scene, const Settings& settings) {
-  if (wantsShadowAlpha(scene, settings) && isBlack(*scene.data().ground))
+  if (scene.data().ground && settings.transparent && isBlack(*scene.data().ground))
     throw Error(
         ExitCode::Usage,
         "--ground --transparent: only lamps light the ground, which cannot tell shadow from distance: give --env");
@@ -306,7 +218,7 @@ Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& sett
     throw Error(ExitCode::Usage, fmt::format("the crop {},{},{},{} is empty or outside the {}x{} frame", w.x0, w.y0,
                                              w.x1, w.y1, settings.width, settings.height));
   requireShadowAlpha(scene, settings);
-  planIntegrators(scene, plan.settings, available, plan);
+  planIntegrators(scene, camera, available, plan);
   for (const PlannedIntegrator& p : plan.integrators)
     for (PlanLine& line : p.integrator->planLines(plan)) plan.lines.push_back(std::move(line));
   planSceneParts(scene, settings, plan);

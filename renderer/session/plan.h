@@ -53,6 +53,11 @@ inline uint64_t pixelItem(const Plan& plan, int x, int y) {
 Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& settings,
               const std::vector<const Integrator*>& available);
 
+// The part of makePlan() that names the integrators, their passes of a round and the reasons; a pilot may render a few
+// passes for it (integrators/README.md, The choice of integrators). The plan has its settings, camera and window.
+void planIntegrators(const Scene& scene, const CameraData& camera, const std::vector<const Integrator*>& available,
+                     Plan& plan);
+
 // Keeps these as well: the plan that makePlan() would give for such settings, without another look at the scene.
 void keepAlso(const KeptBuffers& more, Plan& plan);
 

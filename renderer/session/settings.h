@@ -25,6 +25,7 @@ struct Settings {
   std::optional<PixelWindow> crop;
   std::vector<std::string> integrators{"pt"};
   uint64_t spp = 64;        // passes of each integrator, those of a resumed state included; 0: no limit
+  bool goesOn = false;      // more samples will come: of other machines, or of a run that goes on from this one's state
   uint64_t firstRound = 0;  // where the rounds begin: more than 0 for the later shares of a render on several machines
   double seconds = 0;       // wall-clock limit of the pass loop; 0: none
   int maxDepth = 32;        // segments of a path, the one from the camera included

@@ -141,15 +141,15 @@ class ReachSums {
       if (state.leastPdfW == 0) reach_.throughMedia += value;  // media alone make it that
       if (vertex.deltaOnly) reach_.beyondConnections += visible_.densityOverMirrors(vertex.hit.position) * light;
     }
-    addShares(state, vertex, value, lamp);
+    addShares(state, vertex, light, value, lamp);
     return Onward::Scatter;
   }
 
   LightReach result() const {
     LightReach r = reach_;
     if (total_ > 0)
-      for (double* share : {&r.direct, &r.indirect, &r.caustic, &r.causticVariance, &r.unreachable,
-                            &r.beyondCameraPaths, &r.beyondConnections, &r.throughMedia})
+      for (double* share : {&r.direct, &r.indirect, &r.caustic, &r.causticOverMirrors, &r.causticVariance,
+                            &r.unreachable, &r.beyondCameraPaths, &r.beyondConnections, &r.throughMedia})
         *share /= total_;
     if (scattered_ > 0 && std::isfinite(scattered_))
       r.scatteredRadiance = scattered_ / (static_cast<double>(kPi) * kPaths * visible_.total());
@@ -157,7 +157,7 @@ class ReachSums {
   }
 
  private:
-  void addShares(const SubpathState& state, const SubpathVertex& vertex, double value, bool lamp) {
+  void addShares(const SubpathState& state, const SubpathVertex& vertex, double light, double value, bool lamp) {
     if (vertex.segments == 1 && !vertex.walked) {
       reach_.direct += value;
       return;
@@ -169,6 +169,7 @@ class ReachSums {
       return;
     }
     reach_.caustic += value;
+    reach_.causticOverMirrors += visible_.densityOverMirrors(vertex.hit.position) * light;
     if (!lamp) reach_.unreachable += value;
     const double area = lamp ? areas_.at(context_.scene.emitters()[state.light].mesh) : 0;
     reach_.causticVariance += value / chanceToHit(area, state.travelled);

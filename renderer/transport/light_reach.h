@@ -14,6 +14,8 @@ struct LightReach {
   double direct = 0;    // arriving straight from a light
   double indirect = 0;  // after scattering, the last time from a rough surface
   double caustic = 0;   // the last time from a mirror, a lens or another surface that focuses
+  // Of the caustics what the camera sees over mirrors and through glass alone: connections find it by rare chance.
+  double causticOverMirrors = 0;
   // Relative variance that caustics give to one camera path which can only find them by chance: Σ share / probability
   // of hitting the light over the focusing surface. 1 is as bad as a signal that one path in two sees.
   double causticVariance = 0;

@@ -29,6 +29,7 @@ Settings renderSettings(const RenderOptions& o) {
   Settings settings = makeSettings(o.scene, o.samples);
   settings.keep = o.image.buffers();
   settings.transparent = o.transparent;
+  settings.goesOn = !o.checkpoint.empty() || o.passes || o.resume;
   if (o.error > 0 && o.samples.spp == 0 && o.samples.seconds == 0) settings.spp = 0;
   if (o.samples.placeSamples && o.passes)
     throw Error(ExitCode::Usage, "--place-samples: a share does not know the sums of the others: leave out --passes");
