@@ -23,7 +23,7 @@ constexpr double kMissedDeviations = 2.5;
 constexpr double kBlockPixels = 16;
 // Of light that a pilot's paths need not meet, what still harms beside a photon map that has it: rare finds do not show
 // in the variances that weigh both.
-constexpr double kHiddenBeside = 0.025;
+constexpr double kHiddenBeside = 0.08;
 // Blocks are left out by turns for the standard error.
 constexpr size_t kGroups = 8;
 

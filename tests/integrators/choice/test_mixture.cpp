@@ -36,7 +36,7 @@ TEST_CASE("Alone the expected error falls as the cost rises, and counts fireflie
   CHECK(expectedError({0}, hidden, 128) == doctest::Approx(error + 0.5));
   const double beside = expectedError({0, 1}, hidden, 128) - expectedError({0, 1}, even, 128);
   CHECK(beside > 0);
-  CHECK(beside < 0.5 / 20);  // the photon map has it
+  CHECK(beside < 0.5 / 10);  // the photon map has it
 }
 
 TEST_CASE("A photon map is kept where fireflies lead, and left out where its bias is all that it adds") {
