@@ -7,7 +7,7 @@
 #include "renderer/transport/visibility.h"
 #include "tests/support/bsdf_cases.h"
 #include "tests/support/statistics/chi_squared.h"
-#include "tests/transport/panes.h"
+#include "tests/transport/media/panes.h"
 
 namespace braid::test_panes_transmission {
 

@@ -6,7 +6,7 @@
 
 #include "tests/support/bsdf_cases.h"
 #include "tests/support/statistics/pass_means.h"
-#include "tests/transport/panes.h"
+#include "tests/transport/media/panes.h"
 
 namespace braid::test_panes {
 
