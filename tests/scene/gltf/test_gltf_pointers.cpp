@@ -115,6 +115,23 @@ TEST_CASE("gltf: pointers move lights, lenses, places and visibility") {
   CHECK(file.load().instances.size() == 2);
 }
 
+TEST_CASE("gltf: a pointer moves the weights of a mesh where nodes have none of their own") {
+  GltfFile file = quadFile();
+  const int target = file.accessor<float>({0, 0, 2, 0, 0, 2, 0, 0, 2, 0, 0, 2}, "VEC3");
+  file.primitive()["targets"] = {{{"POSITION", target}}};
+  file.root["nodes"] = {{{"mesh", 0}}, {{"mesh", 0}, {"weights", {1}}}, {{"mesh", 0}}};
+  file.root["scenes"][0]["nodes"] = {0, 1, 2};
+  animate(file, "/meshes/0/weights", {0, 1}, "SCALAR");
+  const SceneData half = file.load(at(1));
+  std::vector<float> heights;
+  for (const MeshInstance& i : half.instances) heights.push_back(half.meshes[i.mesh].positions[0].z);
+  CHECK(heights == std::vector<float>{1, 2, 1});
+  CHECK_FALSE(hasWarning(half, "/animations"));
+  CHECK(file.load().meshes[0].positions[0].z == 0);
+  file.root["nodes"][0]["weights"] = file.root["nodes"][2]["weights"] = {0};
+  CHECK(hasWarning(file.load(at(1)), "leads to nothing that braid can animate"));
+}
+
 TEST_CASE("gltf: a file that is posed again has no trace of the time before") {
   GltfFile file = redQuad();
   animate(file, "/materials/0/pbrMetallicRoughness/baseColorFactor", {1, 0, 0, 1, 0, 1, 0, 1}, "VEC4");
@@ -148,7 +165,8 @@ TEST_CASE("gltf: values of pointers are brought into their range, and those that
        {"", "/", "materials/0/emissiveFactor", "/materials/1/emissiveFactor", "/materials/00/emissiveFactor",
         "/materials/-1/emissiveFactor", "/materials/0/name", "/materials/0/emissiveFactor/0", "/nodes/7/translation",
         "/nodes/0/mesh", "/materials/0/extensions/KHR_materials_sheen/sheenRoughnessFactor", "/materials/0~2/x",
-        "/materials/99999999999999/emissiveFactor", "/buffers/0/byteLength", "/nodes/0/weights"}) {
+        "/materials/99999999999999/emissiveFactor", "/buffers/0/byteLength", "/nodes/0/weights", "/meshes/0/weights",
+        "/meshes/7/weights"}) {
     CAPTURE(std::string(pointer));
     GltfFile wrong = redQuad();
     animate(wrong, pointer, {0, 1}, "SCALAR");

@@ -67,6 +67,28 @@ const Field* numbersAt(const Json& root, const Tokens& tokens) {
   return nullptr;
 }
 
+// The weights of a mesh are those of all nodes that show it and have none of their own: a channel for each. False: no
+// node has them, or together they would be more channels than a file of any use has.
+bool resolveMeshWeights(Document& document, std::vector<tinygltf::AnimationChannel>& channels, size_t channel, int mesh,
+                        size_t& copies) {
+  constexpr size_t kMostCopies = size_t(1) << 20;
+  bool any = false;
+  for (size_t n = 0; n < document.model.nodes.size() && copies < kMostCopies; ++n) {
+    if (document.model.nodes[n].mesh != mesh || !document.model.nodes[n].weights.empty()) continue;
+    tinygltf::AnimationChannel copy = channels[channel];
+    copy.target_node = static_cast<int>(n);
+    copy.target_path = "weights";
+    if (animatedWidth(document, copy) == 0) continue;
+    ++copies;
+    if (any)
+      channels.push_back(std::move(copy));
+    else
+      channels[channel] = std::move(copy);
+    any = true;
+  }
+  return any;
+}
+
 // False: it leads to nothing that can be animated.
 bool resolve(Document& document, tinygltf::AnimationChannel& channel, AnimatedProperty property) {
   const Tokens tokens = tokensOf(property.pointer);
@@ -129,6 +151,7 @@ void readAgain(Document& document, const Json& root, const std::set<std::pair<st
 }  // namespace
 
 void resolvePointers(Document& document) {
+  size_t copies = 0;
   for (size_t clip = 0; clip < document.model.animations.size(); ++clip) {
     std::vector<tinygltf::AnimationChannel>& channels = document.model.animations[clip].channels;
     for (size_t c = 0; c < channels.size(); ++c) {
@@ -137,7 +160,12 @@ void resolvePointers(Document& document) {
       AnimatedProperty property{static_cast<int>(clip), static_cast<int>(c),
                                 pointer.IsString() ? pointer.Get<std::string>() : std::string()};
       const std::string place = "/animations/" + std::to_string(clip) + "/channels/" + std::to_string(c) + "/target";
-      if (resolve(document, channels[c], property)) continue;
+      const Tokens tokens = tokensOf(property.pointer);
+      const bool ofMesh = tokens.size() == 3 && tokens[0] == "meshes" && tokens[2] == "weights";
+      const int mesh = ofMesh ? indexOf(tokens[1], document.model.meshes.size()) : -1;
+      if (mesh >= 0 ? resolveMeshWeights(document, channels, c, mesh, copies)
+                    : resolve(document, channels[c], property))
+        continue;
       channels[c].target_node = -1;
       document.report.warn(place, "its pointer " + gltf::quoted(property.pointer) +
                                       " leads to nothing that braid can animate; it stays at rest");
