@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // EXT_lights_image_based: cubes of PNGs become environments.
 #include <cmath>
-#include <functional>
 
 #include <doctest/doctest.h>
 
 #include "renderer/scene/environment.h"
 #include "tests/scene/gltf/gltf_lenient.h"
 #include "tests/support/render_fixture.h"
-#include "tests/support/textures/png_writer.h"
-#include "tools/options/open_scene.h"
+#include "tests/support/textures/cube_file.h"
 
 namespace braid::test_gltf_image_based {
 
@@ -18,9 +16,8 @@ using test::gltf_lenient::hasNote;
 
 namespace {
 
-constexpr const char* kName = "EXT_lights_image_based";
 using Bytes = std::vector<uint8_t>;
-using FaceColour = std::function<Bytes(size_t face, int x, int y)>;
+constexpr const char* kName = kImageBased;
 
 double linear(uint8_t b) {
   const double v = b / 255.0;
@@ -29,25 +26,6 @@ double linear(uint8_t b) {
 
 uint8_t encoded(double v) {
   return static_cast<uint8_t>(std::lround(255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055)));
-}
-
-// A square that sees one half of the surroundings, a light, and images of `size` pixels for its faces.
-GltfFile cubeFile(int size, const FaceColour& colour) {
-  GltfFile file = quadFile();
-  Json faces = Json::array();
-  for (size_t face = 0; face < 6; ++face) {
-    Bytes pixels;
-    for (int y = 0; y < size; ++y)
-      for (int x = 0; x < size; ++x)
-        for (const uint8_t b : colour(face, x, y)) pixels.push_back(b);
-    const Bytes png = pngOf(static_cast<uint32_t>(size), static_cast<uint32_t>(size), pixels);
-    faces.push_back(file.append("images", {{"bufferView", file.view(png)}, {"mimeType", "image/png"}}));
-  }
-  file.root["extensionsUsed"] = {kName};
-  file.root["extensions"][kName]["lights"] = {
-      {{"intensity", 1}, {"specularImageSize", size}, {"specularImages", {faces}}}};
-  file.root["scenes"][0]["extensions"][kName]["light"] = 0;
-  return file;
 }
 
 Json& light(GltfFile& file) { return file.root["extensions"][kName]["lights"][0]; }
@@ -283,28 +261,6 @@ TEST_CASE("image-based light: coefficients that are no numbers, lights that do n
   scene = file.load();
   CHECK(hasNote(scene, "/irradianceCoefficients/4/1: is null"));
   CHECK_FALSE(hasWarning(scene, "irradiance"));
-}
-
-TEST_CASE("image-based light: --env goes first, and --env-scale, --env-rotate and --light-scale act on either") {
-  GltfFile file = cubeFile(4, [](size_t face, int, int) { return face == 0 ? kBright : Bytes{9, 9, 9, 255}; });
-  const Folder folder;
-  const Bytes png = pngOf(8, 4, Bytes(96, 200));
-  SceneChoice choice;
-  choice.quiet = true;
-  choice.file = folder.write("scene.glb", file.glb());
-  choice.environmentScale = 3;
-  choice.lightScale = 2;
-  choice.environmentRotation = 90;
-  SceneData scene = loadScene(choice);
-  CHECK(scene.environment->ofFile);
-  CHECK(scene.environment->radiance == Spectrum(6));
-  // Turned from +Z toward +X, as --env-rotate turns: what lay in +X lies in -Z.
-  CHECK(Environment(*scene.environment).radiance({0, 0, -1}).x == doctest::Approx(18).epsilon(1e-4));
-  choice.environment = folder.write("sky.png", std::string(png.begin(), png.end()));
-  scene = loadScene(choice);
-  CHECK_FALSE(scene.environment->ofFile);
-  CHECK(scene.environment->image->width == 8);
-  CHECK(hasNote(scene, "another environment is given"));
 }
 
 }  // namespace braid::test_gltf_image_based
