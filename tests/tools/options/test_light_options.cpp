@@ -7,7 +7,7 @@
 #include "tests/support/textures/cube_file.h"
 #include "tools/options/open_scene.h"
 
-namespace braid::test_scene_lights {
+namespace braid::test_light_options {
 
 using namespace test;
 using test::gltf_lenient::hasNote;
@@ -37,4 +37,4 @@ TEST_CASE("image-based light: --env goes first, and --env-scale, --env-rotate an
   CHECK(hasNote(scene, "another environment is given"));
 }
 
-}  // namespace braid::test_scene_lights
+}  // namespace braid::test_light_options
