@@ -26,9 +26,9 @@ const Vec3& receiverNormal(const Hit& hit, bool twoSided) { return twoSided ? hi
 }  // namespace
 
 LightChoice lightChoice(const SampleBlock& block, int k, int count) {
-  // Steps of the plastic number: places of any number of samples are far from each other (Roberts 2018, R2).
-  constexpr float kStepU = 0.7548777f, kStepV = 0.5698403f;
+  constexpr float kStepU = 0.7548777f, kStepV = 0.5698403f;  // of the plastic number (Roberts 2018, R2)
   const auto t = static_cast<float>(k), n = static_cast<float>(count);
+  if (k == 0) return {block.u[slot::kLightSelect], {block.u[slot::kLightU], block.u[slot::kLightV]}, n};
   const auto shifted = [](float u, float by) { return u + by - std::floor(u + by); };
   return {shifted(block.u[slot::kLightSelect], t / n),
           {shifted(block.u[slot::kLightU], t * kStepU), shifted(block.u[slot::kLightV], t * kStepV)},
@@ -282,7 +282,7 @@ void PathKernel::shadeActive() {
     const auto i = static_cast<size_t>(p), ray = static_cast<size_t>(a);
     if (recorder_) recorder_->arrive(p, sample_[i].radiance);
     const bool met = query_[ray].t < kInfinity;
-    if (path_[i].walk.medium) {
+    if (walk_.any() && path_[i].walk.medium) {
       const Flight flight = finishFlight(path_[i], met ? &hit_[ray] : nullptr);
       if (flight == Flight::Scattered) goOn(p);
       if (flight == Flight::Scattered || flight == Flight::Absorbed) continue;

@@ -16,7 +16,6 @@ struct PathState {
   Spectrum throughput{1};
   MediaStack media;
   PathChannel channel;
-  WalkState walk;
   int segments = 0;       // traced so far, null interfaces not counted
   int nullCrossings = 0;  // bounds a path through degenerate nested surfaces
   int panes = 0;          // passed straight; they are no vertices
@@ -36,6 +35,8 @@ struct PathState {
   int bounces = 0;            // scattered at the first non-specular vertex and since; up to 1 of them, light is direct
   bool featuresDone = false;  // the first non-specular vertex is behind
   float featureDistance = 0;  // metres travelled up to it
+
+  WalkState walk;
 
   // Of the random numbers at the surface ahead.
   unsigned block() const { return static_cast<unsigned>(segments + panes); }
