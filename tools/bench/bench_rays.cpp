@@ -109,10 +109,11 @@ class RayBench {
         plan_(plan),
         accel_(accel),
         integrator_(*plan.integrators.front().integrator),
+        preparation_(integrator_.prepare(context, plan)),
         target_(plan.window.width(), plan.window.height(),
                 {.splats = integrator_.splats(), .features = plan.kept.features}),
         film_(plan.window.width(), plan.window.height(), plan.buckets()) {
-    integrator_.renderPass({context_, plan_, 0, nullptr, nullptr, &recorded_}, target_);
+    integrator_.renderPass({context_, plan_, 0, nullptr, nullptr, &recorded_, preparation_.get()}, target_);
     shuffled_ = recorded_;
     for (size_t i = 0; i < shuffled_.size(); ++i) shuffle(shuffled_[i], i);
     for (const auto& tile : recorded_) recordedRays_ += tile.size();
@@ -141,7 +142,8 @@ class RayBench {
     const Stopwatch clock;
     for (uint64_t k = 0; k < passes; ++k) {
       target_.clear();
-      integrator_.renderPass({context_, plan_, film_.passes(), nullptr, &statistics, nullptr}, target_);
+      integrator_.renderPass({context_, plan_, film_.passes(), nullptr, &statistics, nullptr, preparation_.get()},
+                             target_);
       film_.commit(film_.passes(), target_);
     }
     return clock.seconds();
@@ -159,6 +161,7 @@ class RayBench {
   const Plan& plan_;
   const Accel& accel_;
   const Integrator& integrator_;
+  const std::shared_ptr<const Preparation> preparation_;  // once, as for a render: passes without one make their own
   PassTarget target_;
   Accumulator film_;
   Rays recorded_, shuffled_;
