@@ -28,7 +28,8 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kTimeout{"external-command-timeout", 600, "Seconds after which an external command is ended"};
+const OptionInfo kTimeout{
+    "external-command-timeout", 600, "Seconds after which an external command is ended", 0.01, 1e6, false};
 
 // Portable float map: rows from the bottom up, little-endian.
 void writePfm(const std::string& path, const Rgb<float>& image) {

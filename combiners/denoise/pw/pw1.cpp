@@ -11,12 +11,7 @@ namespace braid {
 
 namespace {
 
-const OptionInfo kThreshold{"pw1-threshold",
-                            kPatchWelchWideThreshold,
-                            "Normal deviates up to which a difference of means counts as noise",
-                            0,
-                            1000,
-                            false};
+const OptionInfo kThreshold = thresholdOption("pw1", kPatchWelchWideThreshold);
 const OptionInfo kStride{"pw1-stride", FirstOrderOptions().stride,
                          "Pixels between the centres of the fits: below 5, their weights take more memory than planned",
                          1, PatchWelchNeighbours().outer};

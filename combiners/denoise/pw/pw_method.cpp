@@ -15,10 +15,7 @@ namespace {
 class PatchWelch : public Method {
  public:
   PatchWelch(std::string name, std::string description, double threshold)
-      : name_(std::move(name)),
-        description_(std::move(description)),
-        threshold_{name_ + "-threshold", threshold,
-                   "Normal deviates up to which a difference of means counts as noise"} {}
+      : name_(std::move(name)), description_(std::move(description)), threshold_(thresholdOption(name_, threshold)) {}
 
   const char* name() const override { return name_.c_str(); }
   const char* description() const override { return description_.c_str(); }
@@ -58,8 +55,17 @@ PatchWelchInput patchWelchInputOf(const MethodInputs& in, const std::string& met
   return input;
 }
 
+OptionInfo thresholdOption(const std::string& method, double fallback) {
+  return {method + "-threshold",
+          fallback,
+          "Normal deviates up to which a difference of means counts as noise",
+          0.1,
+          10,
+          false};
+}
+
 double thresholdOf(const MethodInputs& in, const OptionInfo& option) {
-  return std::clamp(in.options.number(option), 0.1, 10.0);
+  return std::clamp(in.options.number(option), option.least, option.most);
 }
 
 MethodResult patchWelchResult(std::vector<Rgb<float>> images) {

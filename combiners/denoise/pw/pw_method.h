@@ -17,7 +17,8 @@ Needs patchWelchNeeds();
 // The input of a method. Throws Error(BadInput) when nothing is known of the noise.
 PatchWelchInput patchWelchInputOf(const MethodInputs& in, const std::string& method);
 
-// The threshold option of a method, kept in [0.1, 10].
+// The threshold option of a method, "<method>-threshold", and its value, kept in the option's range.
+OptionInfo thresholdOption(const std::string& method, double fallback);
 double thresholdOf(const MethodInputs& in, const OptionInfo& option);
 
 // The filtered images, and halves where there are any, as a result.

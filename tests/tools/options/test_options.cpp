@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/combine_plan.h"
@@ -146,6 +147,16 @@ TEST_CASE("Numbers within their ranges pass, with the ends that belong to them")
   refused("--js-constant", "-1", "from 0 to 100");
   refused("--nlm-window", "2.5", "a whole number from 0 to 100");
   refused("--auto-fuse", "2", "from 0 to 1");
+}
+
+TEST_CASE("The default and both ends of every method's option are in its range") {
+  for (const OptionInfo& o : allMethodOptions()) {
+    CHECK_MESSAGE(o.least < o.most, o.name);
+    for (const double value : {o.fallback, o.least, o.most}) taken("--" + o.name, fmt::format("{:.17g}", value));
+  }
+  taken("--pw-threshold", "1.6");
+  refused("--pw-threshold", "11", "a number from 0.1 to 10");
+  taken("--external-command-timeout", "0.5");
 }
 
 TEST_CASE("Sizes, lists of numbers, durations and addresses are checked part by part") {
