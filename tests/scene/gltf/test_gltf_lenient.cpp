@@ -141,6 +141,16 @@ TEST_CASE("lenient: files whose names are spelled otherwise") {
   const SceneData found = loadGltf(scene);
   CHECK(found.meshes.size() == 1);
   CHECK(hasWarning(found, "but the file is 'Textures/m\xC3\xA4hne.bin'; correct the uri"));
+  // Of an image that is found so, nothing else is told.
+  GltfFile textured = quadFile();
+  textured.root["images"] = {{{"uri", "brick.png"}}};
+  textured.root["textures"] = {{{"source", 0}}};
+  giveMaterial(textured, {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}});
+  folder.write("Brick.PNG", {tinyPng().begin(), tinyPng().end()});
+  const SceneData named = loadGltf(folder.write("textured.glb", textured.glb()));
+  CHECK(hasWarning(named, "names 'brick.png', but the file is 'Brick.PNG'"));
+  CHECK_FALSE(hasWarning(named, "does not exist"));
+  CHECK(named.textures.size() == 1);
   // Two that could be meant are none.
   folder.write("Textures/M\xC3\xA4hne.bin", file.binary);
   CHECK(contains(errorOf([&] { loadGltf(scene); }), "does not exist"));

@@ -232,14 +232,13 @@ std::optional<std::vector<uint8_t>> Files::read(const std::string& uri, std::str
     return {};
   }
   // The decoded name is the right one; the others are what careless exporters mean.
-  std::string firstReason;
+  std::string firstReason, other;
   for (const std::string& name : {decoded, plain, withSlashes(decoded)}) {
-    if (auto data = readPath(name, reason)) return data;
-    if (firstReason.empty()) firstReason = reason;
+    if (auto data = readPath(name, firstReason.empty() ? firstReason : other)) return data;
   }
   const std::string loose = looselyNamed(folder_, withSlashes(decoded));
   if (!loose.empty()) {
-    if (auto data = readPath(loose, reason)) {
+    if (auto data = readPath(loose, other)) {
       note = "names " + quoted(decoded) + ", but the file is " + quoted(loose) + "; correct the uri";
       return data;
     }
