@@ -61,6 +61,15 @@ LoadOptions loadOptions(const SceneChoice& c) {
   return options;
 }
 
+// A pose may hide everything for a while, and an environment is worth a look by itself.
+void refuseNothing(const SceneData& data, const SceneChoice& c, double frameTime) {
+  if (!data.instances.empty() || frameTime >= 0 || (data.environment && !data.defaultLight)) return;
+  throw Error(ExitCode::BadInput,
+              c.file +
+                  ": there is nothing to render: no triangles and no environment; give --env, or --point-radius "
+                  "where the file has points or lines");
+}
+
 LogSink sinkOf(const SceneChoice& c) {
   return [quiet = c.quiet](LogLevel level, const std::string& line) {
     if (!quiet && level == LogLevel::Warning) fmt::print(stderr, "warning: {}\n", line);
@@ -116,6 +125,7 @@ SceneData SceneOpener::load(double frameTime) {
 OpenedScene SceneOpener::open(double frameTime) {
   const Stopwatch clock;
   SceneData data = load(frameTime);
+  refuseNothing(data, choice_, frameTime);
   OpenedScene opened;
   opened.loadSeconds = clock.seconds();
   opened.camera = chooseCamera(data, choice_);

@@ -37,4 +37,21 @@ TEST_CASE("image-based light: --env goes first, and --env-scale, --env-rotate an
   CHECK(hasNote(scene, "another environment is given"));
 }
 
+TEST_CASE("Where nothing is to be seen nothing is rendered, but for environments and moments without surfaces") {
+  GltfFile file = triangleFile();
+  file.root["nodes"] = {{{"name", "empty"}}};
+  const Folder folder;
+  SceneChoice choice;
+  choice.quiet = true;
+  choice.size = {8, 6};
+  choice.file = folder.write("scene.glb", file.glb());
+  CHECK_THROWS_WITH_AS(openScene(choice), doctest::Contains("scene.glb: there is nothing to render"), Error);
+  choice.frameTime = 0;
+  CHECK(openScene(choice).scene->data().instances.empty());
+  choice.frameTime = -1;
+  const std::vector<uint8_t> png = pngOf(8, 4, std::vector<uint8_t>(96, 200));
+  choice.environment = folder.write("sky.png", std::string(png.begin(), png.end()));
+  CHECK(openScene(choice).scene->environment().has_value());
+}
+
 }  // namespace braid::test_light_options
