@@ -11,6 +11,7 @@
 #include "tests/support/gltf_fixture.h"
 #include "tests/support/render_fixture.h"
 #include "tests/support/running_braid.h"
+#include "tools/options/turntable.h"
 
 namespace braid::test_studio {
 
@@ -23,10 +24,8 @@ namespace {
 struct Extent {
   Vec2 lo{1e9f}, hi{-1e9f};
 };
-Extent framed(const SceneData& data, int width, int height, float yfov = kDefaultYfov) {
-  const CameraData camera = framingCamera(data, static_cast<float>(width) / static_cast<float>(height), yfov);
+void extend(Extent& e, const SceneData& data, const CameraData& camera, int width, int height) {
   const Camera view(camera, width, height);
-  Extent e;
   for (const MeshInstance& i : data.instances)
     for (const Vec3& p : data.meshes[i.mesh].positions) {
       const std::optional<Vec2> raster = view.project(Vec3(i.toWorld * Vec4(p, 1)));
@@ -35,6 +34,10 @@ Extent framed(const SceneData& data, int width, int height, float yfov = kDefaul
       e.lo = glm::min(e.lo, part);
       e.hi = glm::max(e.hi, part);
     }
+}
+Extent framed(const SceneData& data, int width, int height, float yfov = kDefaultYfov) {
+  Extent e;
+  extend(e, data, framingCamera(data, static_cast<float>(width) / static_cast<float>(height), yfov), width, height);
   return e;
 }
 
@@ -43,6 +46,16 @@ SceneData sceneOf(TriangleMesh mesh) {
   data.materials.push_back(diffuseMaterial(Spectrum(0.5f)));
   addMesh(data, std::move(mesh), 0);
   return data;
+}
+
+// A ball that is drawn out and bent out of shape, somewhere.
+SceneData potato(Rng& rng) {
+  TriangleMesh mesh;
+  const Vec3 size(std::exp(3 * rng.next() - 1.5f), std::exp(3 * rng.next() - 1.5f), std::exp(3 * rng.next() - 1.5f));
+  addSphere(mesh, {0, 0, 0}, 1, 2);
+  for (Vec3& p : mesh.positions) p = p * size * (0.5f + rng.next()) + Vec3(7, -3, 20);
+  mesh.normals.clear();
+  return sceneOf(std::move(mesh));
 }
 
 // A ball on a floor, seen by a camera of its own.
@@ -62,13 +75,30 @@ SceneData ballOnFloor() {
 TEST_CASE("Framing: what is seen spans 85 % of the frame, in its middle, whatever its shape and that of the frame") {
   Rng rng(9);
   for (int i = 0; i < 40; ++i) {
-    TriangleMesh mesh;
-    const Vec3 size(std::exp(3 * rng.next() - 1.5f), std::exp(3 * rng.next() - 1.5f), std::exp(3 * rng.next() - 1.5f));
-    addSphere(mesh, {0, 0, 0}, 1, 2);
-    for (Vec3& p : mesh.positions) p = p * size * (0.5f + rng.next()) + Vec3(7, -3, 20);
-    mesh.normals.clear();
+    const SceneData data = potato(rng);
     const int width = 100 + static_cast<int>(300 * rng.next());
-    const Extent e = framed(sceneOf(std::move(mesh)), width, 200, 0.3f + rng.next());
+    const Extent e = framed(data, width, 200, 0.3f + rng.next());
+    CAPTURE(i);
+    const Vec2 span = e.hi - e.lo, middle = 0.5f * (e.hi + e.lo);
+    CHECK(std::max(span.x, span.y) == doctest::Approx(0.85).epsilon(0.003));
+    CHECK(middle.x == doctest::Approx(0.5).epsilon(0.01));
+    CHECK(middle.y == doctest::Approx(0.5).epsilon(0.01));
+  }
+}
+
+TEST_CASE("Framing: while a turntable turns, all that is seen spans 85 % of the frame, in its middle") {
+  Rng rng(10);
+  for (int i = 0; i < 20; ++i) {
+    const SceneData data = potato(rng);
+    const int width = 100 + static_cast<int>(300 * rng.next()), height = 200;
+    const float aspect = static_cast<float>(width) / static_cast<float>(height);
+    const CameraData start = framingCamera(data, aspect, 0.3f + rng.next(), true);
+    Extent e;
+    for (int k = 0; k < 180; ++k) {
+      CameraData camera = start;
+      turnAbout(turntableAxis(worldBounds(data), data.origin), data.origin, k / 180.0, camera);
+      extend(e, data, camera, width, height);
+    }
     CAPTURE(i);
     const Vec2 span = e.hi - e.lo, middle = 0.5f * (e.hi + e.lo);
     CHECK(std::max(span.x, span.y) == doctest::Approx(0.85).epsilon(0.003));

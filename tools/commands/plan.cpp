@@ -137,6 +137,7 @@ void printRecord(const PreparedRender& render, const std::string& file) {
 int runPlan(PlanOptions o) {
   checkFrames(o.frames, o.scene.frameTime >= 0);
   checkJobOptions(o);
+  o.scene.turntable = o.frames.turntable > 0;
   if (o.frames.plays()) o.scene.frameTime = o.frames.timeOf(o.frames.frames().first);
   if (!o.image.file.empty()) imageFormat(o.image.file);
   Settings settings = makeSettings(o.scene, o.samples);

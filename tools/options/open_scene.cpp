@@ -162,8 +162,9 @@ CameraData chooseCamera(const SceneData& data, const SceneChoice& c) {
   CameraData camera;
   if (!data.cameras.empty()) camera = data.cameras[0];
   if (data.defaultCamera && !c.lookAt)
-    camera = framingCamera(data, static_cast<float>(c.size.width) / static_cast<float>(c.size.height),
-                           c.yfovDegrees > 0 ? glm::radians(static_cast<float>(c.yfovDegrees)) : kDefaultYfov);
+    camera =
+        framingCamera(data, static_cast<float>(c.size.width) / static_cast<float>(c.size.height),
+                      c.yfovDegrees > 0 ? glm::radians(static_cast<float>(c.yfovDegrees)) : kDefaultYfov, c.turntable);
   if (!c.camera.empty()) camera = namedCamera(data, c);
   if (c.lookAt) {
     const Vec3 eye(c.lookAt->eye - data.origin), target(c.lookAt->target - data.origin);

@@ -38,6 +38,7 @@ struct SceneChoice {
   bool full = false;
   int frameScene = -1;
   double frameTime = -1;
+  bool turntable = false;  // the camera goes about the scene
   bool quiet = false, verbose = false;
 };
 void addSceneOptions(CLI::App& command, SceneChoice& choice);

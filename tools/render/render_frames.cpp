@@ -84,6 +84,7 @@ class Frames {
  private:
   void begin() {
     SceneChoice choice = options_.scene;
+    choice.turntable = options_.frames.turntable > 0;
     if (options_.frames.plays()) choice.frameTime = 0;
     opener_.emplace(choice);
     if (options_.frames.turntable == 0) return;

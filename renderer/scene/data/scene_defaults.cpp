@@ -35,14 +35,26 @@ size_t placedTriangles(const SceneData& scene) {
 
 bool isVisible(const Material& m) { return m.alphaMode == AlphaMode::Opaque || m.alpha > 0; }
 
-// The points that a camera has to see, in axes `toView` about `centre`.
-std::vector<Vec3> pointsToFrame(const SceneData& scene, const Mat3& toView, const Vec3& centre) {
-  const bool every = placedTriangles(scene) <= kMostLookedAt;
+// The points that a camera has to see, in axes that it looks along. A camera that turns about the scene sees each of
+// them on a circle about `up`, of which `points` are then the centres; circles of a still camera have no radius.
+struct Framed {
   std::vector<Vec3> points;
+  std::vector<float> radii;
+  Vec3 up;
+
+  void add(const Vec3& p, bool turns) {
+    const Vec3 centre = glm::dot(p, up) * up;
+    points.push_back(turns ? centre : p);
+    radii.push_back(turns ? glm::distance(p, centre) : 0);
+  }
+};
+Framed pointsToFrame(const SceneData& scene, const Mat3& toView, const Vec3& centre, bool turns) {
+  const bool every = placedTriangles(scene) <= kMostLookedAt;
+  Framed framed{{}, {}, toView[1]};
   for (const MeshInstance& instance : scene.instances) {
     const TriangleMesh& mesh = scene.meshes[instance.mesh];
     if (!isVisible(scene.materials[mesh.material])) continue;
-    const auto add = [&](const Vec3& p) { points.push_back(toView * (Vec3(instance.toWorld * Vec4(p, 1)) - centre)); };
+    const auto add = [&](const Vec3& p) { framed.add(toView * (Vec3(instance.toWorld * Vec4(p, 1)) - centre), turns); };
     if (every) {
       std::vector<bool> used(mesh.positions.size());  // stray vertices show nothing
       for (const glm::uvec3& t : mesh.triangles) used[t.x] = used[t.y] = used[t.z] = true;
@@ -53,7 +65,7 @@ std::vector<Vec3> pointsToFrame(const SceneData& scene, const Mat3& toView, cons
       for (int k = 0; k < 8; ++k) add(corner(bounds, k));
     }
   }
-  return points;
+  return framed;
 }
 
 // Where planes through the points touch them whose slope to the view is `slope`: a frame of that tangent has to stand
@@ -62,24 +74,30 @@ struct Touch {
   float high = 0, low = 0;
   float distance(float slope) const { return (high + low) / (2 * slope); }
 };
-Touch touch(const std::vector<Vec3>& points, int axis, float slope) {
+Touch touch(const Framed& framed, int axis, float slope) {
   Touch t{-kInfinity, -kInfinity};
-  for (const Vec3& p : points) {
-    t.high = std::max(t.high, p[axis] + slope * p.z);
-    t.low = std::max(t.low, -p[axis] + slope * p.z);
+  Vec3 high(0, 0, slope), low(0, 0, slope);
+  high[axis] = 1;
+  low[axis] = -1;
+  // How far a circle of radius 1 reaches towards the planes.
+  const float highReach = glm::length(glm::cross(high, framed.up)), lowReach = glm::length(glm::cross(low, framed.up));
+  for (size_t i = 0; i < framed.points.size(); ++i) {
+    const Vec3& p = framed.points[i];
+    t.high = std::max(t.high, p[axis] + slope * p.z + highReach * framed.radii[i]);
+    t.low = std::max(t.low, -p[axis] + slope * p.z + lowReach * framed.radii[i]);
   }
   return t;
 }
 
 // The eye, in the axes of the points, from which they span their part of the frame, centred in both directions.
-Vec3 framingEye(const std::vector<Vec3>& points, Vec2 slopes) {
+Vec3 framingEye(const Framed& framed, Vec2 slopes) {
   const float distance =
-      std::max(touch(points, 0, slopes.x).distance(slopes.x), touch(points, 1, slopes.y).distance(slopes.y));
+      std::max(touch(framed, 0, slopes.x).distance(slopes.x), touch(framed, 1, slopes.y).distance(slopes.y));
   Vec3 eye(0, 0, distance);
   for (int axis = 0; axis < 2; ++axis) {
     float slope = slopes[axis];
     for (int i = 0; i < 8; ++i) {
-      const Touch t = touch(points, axis, slope);
+      const Touch t = touch(framed, axis, slope);
       eye[axis] = 0.5f * (t.high - t.low);
       const float fitting = distance > 0 ? (t.high + t.low) / (2 * distance) : slope;
       if (!(fitting > 0) || fitting > slope) break;
@@ -165,7 +183,7 @@ Bounds worldBounds(const SceneData& scene) {
   return bounds;
 }
 
-CameraData framingCamera(const SceneData& scene, float aspect, float yfov) {
+CameraData framingCamera(const SceneData& scene, float aspect, float yfov, bool turns) {
   CameraData camera;
   camera.name = "default";
   camera.yfov = yfov;
@@ -175,10 +193,10 @@ CameraData framingCamera(const SceneData& scene, float aspect, float yfov) {
   const std::optional<Vec3> open = openSide(scene, bounds);
   const Vec3 back = open ? *open : viewDirection(bounds);
   const Mat3 toWorld(lookAlong(Vec3(0), back));
-  const std::vector<Vec3> points = pointsToFrame(scene, glm::transpose(toWorld), bounds.centre());
-  if (points.empty()) return camera;
+  const Framed framed = pointsToFrame(scene, glm::transpose(toWorld), bounds.centre(), turns);
+  if (framed.points.empty()) return camera;
   const float slope = (open ? kFramedPartOfRoom : kFramedPart) * std::tan(0.5f * yfov);
-  Vec3 eye = framingEye(points, {slope * aspect, slope});
+  Vec3 eye = framingEye(framed, {slope * aspect, slope});
   if (!(eye.z > 0)) eye.z = 3;
   camera.toWorld = lookAlong(bounds.centre() + toWorld * eye, back);
   return camera;

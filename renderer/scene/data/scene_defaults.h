@@ -15,8 +15,10 @@ inline constexpr float kDefaultYfov = 0.7f;
 Bounds worldBounds(const SceneData& scene);
 
 // A perspective camera at a three-quarter view of the front, which glTF has in +Z, in whose frame of this aspect
-// (width / height) the visible surfaces span 85 % of the width or of the height.
-CameraData framingCamera(const SceneData& scene, float aspect = 16 / 9.0f, float yfov = kDefaultYfov);
+// (width / height) the visible surfaces span 85 % of the width or of the height. With `turns` they do so of all that is
+// seen while the camera goes about the vertical axis through the middle of the bounds.
+CameraData framingCamera(const SceneData& scene, float aspect = 16 / 9.0f, float yfov = kDefaultYfov,
+                         bool turns = false);
 
 // Lights the scene, with light of `scale` times the usual radiance.
 void giveDefaultLight(SceneData& scene, DefaultLight kind, float scale = 1);

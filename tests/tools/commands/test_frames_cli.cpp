@@ -169,6 +169,24 @@ TEST_CASE("A turntable turns a still scene, and begins where the camera stands")
   CHECK(bytes(folder, "turn_0.exr") != "");
 }
 
+TEST_CASE("A turntable of a file without a camera cuts nothing off, in any turn") {
+  const Folder folder;
+  movingScene(folder);  // a square, which comes nearer to the camera than the middle does when it turns
+  must(folder,
+       "render moving.glb -q --size 32x32 --integrator pt --combine none --spp 4 --transparent --turntable 8 "
+       "-o turn_#.exr");
+  for (int frame = 0; frame < 8; ++frame) {
+    const Plane<float> alpha = readImage(folder.path / fmt::format("turn_{}.exr", frame)).planes.at("A");
+    CAPTURE(frame);
+    float most = 0;
+    for (int i = 0; i < 32; ++i) {
+      CHECK(alpha.at(i, 0) + alpha.at(i, 31) + alpha.at(0, i) + alpha.at(31, i) == 0);
+      most = std::max(most, alpha.at(i, 16));
+    }
+    CHECK((most > 0 || (frame >= 2 && frame <= 6)));  // on edge, and from behind
+  }
+}
+
 TEST_CASE("Frames that cannot be are refused in one line") {
   const Folder folder;
   movingScene(folder);
