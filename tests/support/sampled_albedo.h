@@ -35,6 +35,20 @@ inline Albedo sampledAlbedo(const Bsdf& bsdf, int side, bool withDelta, Rng& rng
   return a;
 }
 
+// Of radiance, by `count` points of a lattice in three dimensions (Roberts 2018) instead of random ones: without noise.
+inline double latticeAlbedo(const Bsdf& bsdf, int count) {
+  constexpr double kRoot = 1.2207440846057596;  // of x⁴ = x + 1
+  const glm::dvec3 step(1 / kRoot, 1 / (kRoot * kRoot), 1 / (kRoot * kRoot * kRoot));
+  double sum = 0;
+  for (int i = 0; i < count; ++i) {
+    const Vec3 u = glm::min(Vec3(glm::fract(0.5 + static_cast<double>(i) * step)), Vec3(0.99999994f));
+    BsdfSample s;
+    if (bsdf.sample(u.z, {u.x, u.y}, s))
+      sum += static_cast<double>(s.weight.y / (s.transmitted ? bsdf.radianceScale() : 1));
+  }
+  return sum / count;
+}
+
 // Of radiance, without its compression by refraction.
 inline Albedo radianceAlbedo(const Bsdf& bsdf, int side, Rng& rng) {
   return sampledAlbedo(bsdf, side, true, rng, 1 / bsdf.radianceScale());

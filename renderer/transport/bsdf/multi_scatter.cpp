@@ -17,7 +17,7 @@ namespace braid {
 namespace {
 
 // Rows are uniform in sqrt(alpha), columns in sqrt(cosine), indices in the root of (η - 1) / (η + 1), up to η = 3.
-constexpr size_t kAlphas = 20, kCosines = 32, kIndices = 11;
+constexpr size_t kAlphas = 20, kCosines = 32, kIndices = 21;
 constexpr float kMostIndex = 0.5f;
 constexpr int kIterations = 40;
 
@@ -25,9 +25,9 @@ constexpr int kIterations = 40;
 struct Cells {
   int phi, z;
 };
-constexpr Cells kMetalCells = {20, 24}, kGlassCells = {8, 24};
+constexpr Cells kMetalCells = {12, 48}, kGlassCells = {8, 32};
 // From within a solid, where total reflection begins abruptly.
-constexpr Cells kInsideCells = {32, 28};
+constexpr Cells kInsideCells = {20, 56};
 
 using Columns = std::array<float, kCosines>;
 using Rows = std::array<Columns, kAlphas>;
@@ -55,15 +55,18 @@ float inRows(const Rows& rows, const TableRow& alpha, const TableRow& column) {
 }
 
 // Calls visit(h, cosine to h, weight) for the visible normals of a direction, by the midpoint rule. Cells are small
-// where normals are steep: what is lost is lost there. Half a turn is enough: wo lies in the plane of symmetry.
+// where normals are steep: what is lost is lost there. Each ring is turned by the golden ratio against the one before,
+// so that the edge of total reflection does not run along the grid.
 template <class Visit>
 void forVisibleNormals(const Ggx& ggx, const Vec3& wo, const Cells& cells, const Visit& visit) {
   const float stretch = ggx.stretch(wo);
   // The sum of the midpoints' 3 t² is 1 - 1 / (4 z²).
   const float sum = static_cast<float>(cells.phi * cells.z) * (1 - 0.25f / sqr(static_cast<float>(cells.z)));
   for (int k = 0; k < cells.phi * cells.z; ++k) {
-    const float t = (static_cast<float>(k / cells.phi) + 0.5f) / static_cast<float>(cells.z);
-    const float turn = (static_cast<float>(k % cells.phi) + 0.5f) / static_cast<float>(2 * cells.phi);
+    const auto ring = static_cast<float>(k / cells.phi);
+    const float t = (ring + 0.5f) / static_cast<float>(cells.z);
+    const float turn =
+        (static_cast<float>(k % cells.phi) + glm::fract(0.61803399f * ring)) / static_cast<float>(cells.phi);
     const float weight = 3 * sqr(t) / sum;
     const Vec3 h = ggx.sampleVisibleNormal(wo, stretch, {turn, 1 - t * t * t});
     const float oh = glm::dot(wo, h);
@@ -241,7 +244,7 @@ Spectrum SpecularLayer::reflectance(const Facet& facet) const {
     const Spectrum dielectric = glm::max(facet.fresnel.reflect - metallic_ * metal, Spectrum(0));
     result += dielectric * (transmissionShare_ * (glassFactor(facet.i.z) - 1));
   }
-  return result;
+  return glm::max(result, Spectrum(0));  // rounding can leave less than nothing of almost nothing
 }
 
 }  // namespace braid
