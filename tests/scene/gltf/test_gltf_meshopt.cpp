@@ -117,6 +117,29 @@ Bytes decoded(const Bytes& stream, size_t count, size_t stride) {
   return decodeMeshoptVertices(stream, count, stride, out.data()) ? out : Bytes();
 }
 
+// An accessor whose elements are packed.
+int packedAccessor(GltfFile& file, const Bytes& stream, size_t count, size_t stride, Json accessor,
+                   const char* filter = "NONE") {
+  const Json place = file.root["bufferViews"][static_cast<size_t>(file.view(stream))];
+  accessor["count"] = count;
+  accessor["bufferView"] = file.append("bufferViews", {{"buffer", 1},
+                                                       {"byteLength", count * stride},
+                                                       {"extensions",
+                                                        {{"KHR_meshopt_compression",
+                                                          {{"buffer", 0},
+                                                           {"byteOffset", place["byteOffset"]},
+                                                           {"byteLength", stream.size()},
+                                                           {"byteStride", stride},
+                                                           {"count", count},
+                                                           {"filter", filter},
+                                                           {"mode", "ATTRIBUTES"}}}}}});
+  file.root["buffers"] = {
+      {{"byteLength", file.binary.size()}},
+      {{"byteLength", count * stride}, {"extensions", {{"KHR_meshopt_compression", {{"fallback", true}}}}}}};
+  file.root["extensionsUsed"] = file.root["extensionsRequired"] = {"KHR_meshopt_compression"};
+  return file.append("accessors", accessor);
+}
+
 }  // namespace
 
 TEST_CASE("meshopt: the example of the specification") {
@@ -210,28 +233,34 @@ TEST_CASE("gltf: meshopt of version 1 gives the mesh that plain data gives") {
   Bytes data(48);
   std::memcpy(data.data(), positions.data(), 48);
   GltfFile file = quadFile();
-  const Bytes stream = encoded(data, 12, {0, 1, 0x52});
-  const int raw = file.view(stream);
-  const Json place = file.root["bufferViews"][static_cast<size_t>(raw)];
-  const int view = file.append("bufferViews", {{"buffer", 1},
-                                               {"byteLength", 48},
-                                               {"extensions",
-                                                {{"KHR_meshopt_compression",
-                                                  {{"buffer", 0},
-                                                   {"byteOffset", place["byteOffset"]},
-                                                   {"byteLength", stream.size()},
-                                                   {"byteStride", 12},
-                                                   {"count", 4},
-                                                   {"mode", "ATTRIBUTES"}}}}}});
-  const int accessor =
-      file.append("accessors", {{"bufferView", view}, {"componentType", 5126}, {"type", "VEC3"}, {"count", 4}});
-  file.root["buffers"] = {{{"byteLength", file.binary.size()}},
-                          {{"byteLength", 48}, {"extensions", {{"KHR_meshopt_compression", {{"fallback", true}}}}}}};
-  file.root["extensionsUsed"] = file.root["extensionsRequired"] = {"KHR_meshopt_compression"};
   const TriangleMesh plain = onlyMesh(file.load());
-  file.primitive()["attributes"]["POSITION"] = accessor;
+  file.primitive()["attributes"]["POSITION"] =
+      packedAccessor(file, encoded(data, 12, {0, 1, 0x52}), 4, 12, {{"componentType", 5126}, {"type", "VEC3"}});
   const TriangleMesh packed = onlyMesh(file.load());
   CHECK(packed.positions == plain.positions);
+}
+
+TEST_CASE("gltf: colours under meshopt's filter COLOR are those of plain data") {
+  GltfFile plain = quadFile();
+  Bytes luma;
+  std::vector<uint8_t> grey;
+  for (const uint8_t y : {255, 128, 3, 0}) {
+    luma.insert(luma.end(), {y, 0, 0, 255});
+    grey.insert(grey.end(), {y, y, y, 255});
+  }
+  const Json bytes = {{"componentType", 5121}, {"normalized", true}, {"type", "VEC4"}};
+  GltfFile file = plain;
+  const int colours = plain.accessor<uint8_t>(grey, "VEC4");
+  plain.root["accessors"][static_cast<size_t>(colours)]["normalized"] = true;
+  plain.primitive()["attributes"]["COLOR_0"] = colours;
+  file.primitive()["attributes"]["COLOR_0"] = packedAccessor(file, encoded(luma, 4, {0}), 4, 4, bytes, "COLOR");
+  const SceneData scene = file.load();
+  REQUIRE(onlyMesh(scene).colors.size() == 4);
+  CHECK(onlyMesh(scene).colors == onlyMesh(plain.load()).colors);
+  CHECK(scene.extensionsIgnored.empty());
+  // Without the filter luma is red.
+  file.root["bufferViews"].back()["extensions"]["KHR_meshopt_compression"]["filter"] = "NONE";
+  CHECK(onlyMesh(file.load()).colors != onlyMesh(scene).colors);
 }
 
 }  // namespace braid::test_gltf_meshopt
