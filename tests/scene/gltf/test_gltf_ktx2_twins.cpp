@@ -117,13 +117,14 @@ GltfFile sceneWith(const ByteVector& image) {
   return file;
 }
 
-std::vector<float> rendered(const GltfFile& file) {
+std::vector<float> rendered(const GltfFile& file, const std::string& integrator) {
   const Folder folder;
   const auto scene = load(folder.write("scene.glb", file.glb()), GltfFile::plainLight());
   Settings settings;
   settings.width = settings.height = 16;
   settings.spp = 4;
   settings.threads = 1;
+  settings.integrators = {integrator};
   std::vector<float> values;
   for (const auto& [name, plane] : render(*scene, plan(*scene, settings)).planes)
     values.insert(values.end(), plane.data.begin(), plane.data.end());
@@ -132,12 +133,15 @@ std::vector<float> rendered(const GltfFile& file) {
 
 }  // namespace
 
-TEST_CASE("gltf: a picture as PNG, as plain KTX2 and as UASTC renders to the same bits") {
-  const std::vector<float> expected = rendered(sceneWith(png()));
-  CHECK(expected.size() >= 16 * 16 * 3);
-  CHECK(rendered(sceneWith(plain())) == expected);
-  CHECK(rendered(sceneWith(uastc())) == expected);
-  CHECK(rendered(sceneWith(etc1s())) != expected);
+TEST_CASE("gltf: a picture as PNG, as plain KTX2 and as UASTC renders to the same bits, by every integrator") {
+  for (const char* integrator : {"pt", "crn", "gdpt", "bdpt", "vcm", "sppm"}) {
+    CAPTURE(std::string(integrator));
+    const std::vector<float> expected = rendered(sceneWith(png()), integrator);
+    CHECK(expected.size() >= 16 * 16 * 3);
+    CHECK(rendered(sceneWith(plain()), integrator) == expected);
+    CHECK(rendered(sceneWith(uastc()), integrator) == expected);
+    CHECK(rendered(sceneWith(etc1s()), integrator) != expected);
+  }
 }
 
 TEST_CASE("gltf: a picture as ETC1S is within its five bits of the PNG") {
