@@ -33,12 +33,8 @@ const std::vector<std::string> kWrong = {
 // tools/options/syntax/option_checks.h.
 const std::set<std::string> kTexts = {"FILE", "FILES", "FOLDER", "NAME", "NAMES", "OPTIONS", "SET"};
 
-// The command line, parsed anew each time: options keep their values.
-std::string complaintOf(const std::vector<std::string>& words) {
-  CLI::App app;
-  MainOptions options;
-  Action action;
-  addCommands(app, options, action);
+// What the command line says of a value that it refuses; empty if it takes it.
+std::string complaintOf(CLI::App& app, const std::vector<std::string>& words) {
   std::vector<std::string> reversed(words.rbegin(), words.rend());
   try {
     app.parse(reversed);
@@ -47,6 +43,15 @@ std::string complaintOf(const std::vector<std::string>& words) {
   } catch (const CLI::ParseError&) {
   }
   return "";
+}
+
+// By a command line of its own: options keep the values that they take.
+std::string complaintOf(const std::vector<std::string>& words) {
+  CLI::App app;
+  MainOptions options;
+  Action action;
+  addCommands(app, options, action);
+  return complaintOf(app, words);
 }
 
 bool takesValues(const CLI::Option& o) { return o.get_items_expected_max() > 0; }
@@ -108,7 +113,7 @@ TEST_CASE("Every option of every subcommand refuses what is no number of its ran
         CAPTURE(wrong);
         std::vector<std::string> all = words;
         all.push_back(name + "=" + wrong);
-        const std::string complaint = complaintOf(all);
+        const std::string complaint = complaintOf(app, all);  // all are refused, so that one serves for all
         CHECK_MESSAGE(contains(complaint, "expected "), name, "=", wrong, " of ", command->get_name(), ": ", complaint);
         CHECK(contains(complaint, name));
       }
