@@ -20,20 +20,7 @@ constexpr float kLeastGuidedScale = 1e-4f;
 // Later vertices carry too little for a guide to pay.
 constexpr int kGuidedSegments = 3;
 
-// The normal by which lights are chosen at a hit.
-const Vec3& receiverNormal(const Hit& hit, bool twoSided) { return twoSided ? hit.ng : hit.frame.n; }
-
 }  // namespace
-
-LightChoice lightChoice(const SampleBlock& block, int k, int count) {
-  constexpr float kStepU = 0.7548777f, kStepV = 0.5698403f;  // of the plastic number (Roberts 2018, R2)
-  const auto t = static_cast<float>(k), n = static_cast<float>(count);
-  if (k == 0) return {block.u[slot::kLightSelect], {block.u[slot::kLightU], block.u[slot::kLightV]}, n};
-  const auto shifted = [](float u, float by) { return u + by - std::floor(u + by); };
-  return {shifted(block.u[slot::kLightSelect], t / n),
-          {shifted(block.u[slot::kLightU], t * kStepU), shifted(block.u[slot::kLightV], t * kStepV)},
-          n};
-}
 
 void PathKernel::add(const Spectrum& radiance, bool direct, PathSample& sample) const {
   sample.radiance += radiance;
@@ -113,53 +100,6 @@ void PathKernel::recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsd
   surfaceFeatures(scene_, hit, bsdf, path.featureDistance, sample.features);
 }
 
-bool PathKernel::sampleLight(const PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided,
-                             const LightChoice& choice, ShadowRay& shadow) const {
-  LightSample light;
-  if (!context_.lights.sample({hit.position, receiverNormal(hit, twoSided), twoSided, hit.time}, choice.select,
-                              choice.place, light))
-    return false;
-  const Vec3 wi = hit.frame.toLocal(light.wi);
-  const bool reflects = glm::dot(light.wi, hit.ng) > 0;
-  // Light on the other side of the geometric surface than of the shading one would leak through it.
-  if (reflects != (wi.z > 0) || (!reflects && !twoSided)) return false;
-  const BsdfValue value = bsdf.evaluate(wi);
-  if (isBlack(value.f)) return false;
-
-  const float pdfW = choice.count * light.pdfW;
-  const float weight = light.delta ? 1.0f : powerHeuristic(pdfW, value.pdfW);
-  shadow.contribution = path.throughput * value.f * light.radiance * (weight / pdfW);
-  setShadowRay(hit, light.wi, light.distance, mix32(path.salt ^ 0x51ed270bu) & ~kCameraRay, shadow.ray);
-  const bool volume = context_.summaryOf(hit).volume;
-  shadow.index = 1;
-  if (!path.media.empty() || volume) {
-    MediaStack media = path.media;
-    if (!reflects && volume) media.cross(hit.mesh->material, hit.front);
-    shadow.contribution *= mediaTransmittance(scene_, media, light.distance);
-    shadow.index = mediumIndex(scene_, media);
-  }
-  return true;
-}
-
-void PathKernel::sampleLights(int p, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided, const SampleBlock& block,
-                              bool forFeatures) {
-  PathState& path = path_[static_cast<size_t>(p)];
-  const int count = path.bounces == 0 ? aids_.lightSamples : 1;
-  path.lastLightSamples = static_cast<float>(count);
-  for (int k = 0; k < count; ++k) {
-    if (shadowCount_ == kBatch) {
-      traceShadows();
-      shadowCount_ = 0;
-    }
-    ShadowRay& shadow = shadow_[static_cast<size_t>(shadowCount_)];
-    if (!sampleLight(path, hit, bsdf, twoSided, lightChoice(block, k, count), shadow)) continue;
-    shadow.forFeatures = forFeatures && k == 0;
-    shadow.direct = path.bounces == 0;
-    shadowRays_.set(shadowCount_, shadow.ray, shadow.index);
-    shadowPath_[static_cast<size_t>(shadowCount_++)] = p;
-  }
-}
-
 // Continues the path in a direction sampled from the BSDF and the guide; false when it ends here.
 bool PathKernel::scatter(PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided,
                          const SampleBlock& block) const {
@@ -194,7 +134,7 @@ bool PathKernel::turn(PathState& path, const Hit& hit, const Bsdf& bsdf, bool tw
   path.origin = offsetOrigin(hit, direction);
   path.direction = direction;
   path.lastPosition = hit.position;
-  path.lastNormal = receiverNormal(hit, twoSided);
+  path.lastNormal = receiverAt(hit, twoSided).normal;
   path.lastTwoSided = twoSided;
   path.lastPdfW = sample.pdfW;
   path.lightCouldNotBeSampled = sample.delta;
@@ -267,6 +207,7 @@ void PathKernel::prepareShading() {
     makeHit(scene_, query_[i], path.direction, hit_[i]);
     block_[i] = sampler_.block(path.key, path.block());
   }
+  if (context_.lights.usesHierarchy()) pickLights();
 }
 
 void PathKernel::shadeActive() {
@@ -293,7 +234,7 @@ void PathKernel::shadeActive() {
       addEnvironment(path_[i], sample_[i]);
       continue;
     }
-    if (shade(p, hit_[ray], block_[ray])) goOn(p);
+    if (shade(p, ray)) goOn(p);
   }
   activeCount_ = alive;
 }
@@ -315,7 +256,8 @@ void PathKernel::traceShadows() {
   shadowRayCount += static_cast<uint64_t>(shadowCount_);
 }
 
-bool PathKernel::shade(int p, const Hit& hit, const SampleBlock& block) {
+bool PathKernel::shade(int p, size_t ray) {
+  const Hit& hit = hit_[ray];
   PathState& path = path_[static_cast<size_t>(p)];
   PathSample& sample = sample_[static_cast<size_t>(p)];
   if (observer_) observer_->onHit(hit);
@@ -339,12 +281,12 @@ bool PathKernel::shade(int p, const Hit& hit, const SampleBlock& block) {
   if (firstNonSpecular) recordFeatures(path, hit, bsdf, sample);
   if (path.segments >= plan_.settings.maxDepth) return passPane(path, hit, bsdf.straightTransmittance());
 
-  const bool twoSided = (lobes & kTransmittingLobes) != 0;
+  const bool twoSided = material.transmits();
   const bool asks = aids_.guide && path.segments <= kGuidedSegments && bsdf.hasNonDelta() && !path.walk.medium;
   const GuidedBsdf guided = asks ? GuidedBsdf(bsdf, *aids_.guide, hit) : GuidedBsdf(bsdf);
   if (guided.guided()) ++guidedCount;
-  if (bsdf.hasNonDelta()) sampleLights(p, hit, guided, twoSided, block, firstNonSpecular && path.featuresDone);
-  return scatter(path, hit, guided, twoSided, block);
+  if (bsdf.hasNonDelta()) sampleLights(p, ray, guided, firstNonSpecular && path.featuresDone);
+  return scatter(path, hit, guided, twoSided, block_[ray]);
 }
 
 }  // namespace braid

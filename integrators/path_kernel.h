@@ -34,6 +34,11 @@ struct LightChoice {
 // The k-th: a lattice that the block's numbers shift, so that the samples differ in their lights and places.
 LightChoice lightChoice(const SampleBlock& block, int k = 0, int count = 1);
 
+// As a hit asks for light.
+inline Receiver receiverAt(const Hit& hit, bool twoSided) {
+  return {hit.position, twoSided ? hit.ng : hit.frame.n, twoSided, hit.time};
+}
+
 // What is found out before the first pass about how paths are best sampled.
 struct PathAids {
   const Guide* guide = nullptr;  // directions are sampled with it, too; null: by BSDFs alone
@@ -92,10 +97,12 @@ class PathKernel {
   void traceActive();
   void shadeActive();
   void traceShadows();
-  // Hits and random numbers of all active paths whose rays hit something.
+  // Hits, random numbers and lights of all active paths whose rays hit something.
   void prepareShading();
-  // One step of a path from a hit; true when it goes on. Shadow rays are appended.
-  bool shade(int p, const Hit& hit, const SampleBlock& block);
+  void pickLights();
+  int lightSamplesOf(const PathState& path) const { return path.bounces == 0 ? aids_.lightSamples : 1; }
+  // One step of a path from the hit of a ray; true when it goes on. Shadow rays are appended.
+  bool shade(int p, size_t ray);
   void addEnvironment(const PathState& path, PathSample& sample) const;
   void addEmission(const PathState& path, const Hit& hit, PathSample& sample) const;
   void addUnlit(PathState& path, const Hit& hit, PathSample& sample) const;
@@ -106,8 +113,9 @@ class PathKernel {
   Flight finishFlight(PathState& path, const Hit* hit) const;
   bool sampleLight(const PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided,
                    const LightChoice& choice, ShadowRay& shadow) const;
-  void sampleLights(int p, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided, const SampleBlock& block,
-                    bool forFeatures);
+  bool connectLight(const PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided,
+                    const LightSample& light, ShadowRay& shadow) const;
+  void sampleLights(int p, size_t ray, const GuidedBsdf& bsdf, bool forFeatures);
   bool scatter(PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided, const SampleBlock& block) const;
   bool turn(PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const BsdfSample& sample) const;
   void recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsdf, PathSample& sample) const;
@@ -132,6 +140,9 @@ class PathKernel {
   std::array<RayHit, kBatch> query_;
   std::array<Hit, kBatch> hit_;
   std::array<SampleBlock, kBatch> block_;
+  // Where there is a hierarchy of lights: what it has picked, and the first pick of a ray's vertex.
+  std::vector<LightQuery> picked_;
+  std::array<size_t, kBatch> firstPicked_;
   std::array<int, kBatch> active_;  // indices of the paths that go on
   int activeCount_ = 0;
   VisibilityBatch shadowRays_;

@@ -23,6 +23,7 @@ struct MaterialSummary {
   bool pane = false;  // Material::mayBePane()
   bool ground = false;
   bool disperses = false;
+  bool transmits() const { return (lobes & kTransmittingLobes) != 0; }
   bool special() const { return emissive || unlit || volume || ground; }
 };
 

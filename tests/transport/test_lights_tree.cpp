@@ -55,16 +55,15 @@ bool contributes(const LightBounds& b, const Vec3& p, const Vec3& n, bool twoSid
 double choicesPValue(const LightTree& tree, size_t lights, const Vec3& p, const Vec3& n, Rng& rng, int count) {
   std::vector<double> observed(lights + 1, 0), expected(lights + 1, 0);
   for (int i = 0; i < count; ++i) {
-    float u = rng.next(), probability = 0;
-    const uint32_t light = tree.sample(p, n, false, u, probability);
-    observed[probability > 0 ? light : lights] += 1;
-    if (!(probability > 0)) continue;
-    REQUIRE((u >= 0 && u < 1));
-    if (i % 64 == 0) REQUIRE(tree.probability(p, n, false, light) == doctest::Approx(probability).epsilon(1e-4));
+    LightQuery query{p, n, false, rng.next()};
+    tree.sample(query);
+    observed[query.probability > 0 ? query.light : lights] += 1;
+    if (!(query.probability > 0)) continue;
+    if (i % 64 == 0) REQUIRE(tree.probability(query, query.light) == doctest::Approx(query.probability).epsilon(1e-4));
   }
   expected[lights] = count;
   for (size_t i = 0; i < lights; ++i) {
-    expected[i] = count * static_cast<double>(tree.probability(p, n, false, static_cast<uint32_t>(i)));
+    expected[i] = count * static_cast<double>(tree.probability({p, n, false}, static_cast<uint32_t>(i)));
     expected[lights] -= expected[i];
   }
   return test::pValueOf(observed, expected);
@@ -72,7 +71,7 @@ double choicesPValue(const LightTree& tree, size_t lights, const Vec3& p, const 
 
 double sumOfProbabilities(const LightTree& tree, size_t lights, const Vec3& p, const Vec3& n, bool twoSided) {
   double sum = 0;
-  for (uint32_t i = 0; i < lights; ++i) sum += static_cast<double>(tree.probability(p, n, twoSided, i));
+  for (uint32_t i = 0; i < lights; ++i) sum += static_cast<double>(tree.probability({p, n, twoSided}, i));
   return sum;
 }
 
@@ -104,7 +103,7 @@ TEST_CASE("The hierarchy chooses each light with the probability it states, and 
         if (n != Vec3(0) && !contributes(bounds[l], p, n, twoSided)) continue;
         any = any || n != Vec3(0);
         ++contributing;
-        starved += n != Vec3(0) && !(tree.probability(p, n, twoSided, l) > 0);
+        starved += n != Vec3(0) && !(tree.probability({p, n, twoSided}, l) > 0);
       }
       if (any) worst = std::max(worst, std::fabs(sumOfProbabilities(tree, bounds.size(), p, n, twoSided) - 1));
     }
@@ -130,10 +129,31 @@ TEST_CASE("A hundred thousand lights are chosen as stated, and so is a single on
   CHECK(choicesPValue(tree, bounds.size(), p, Vec3(0), rng, 200000) > kFalseAlarm);
   bounds.resize(1);
   tree.build(bounds);
-  float u = 0.3f, probability = 0;
-  CHECK(tree.sample(p, Vec3(0), false, u, probability) == 0);
-  CHECK(probability == 1);
-  CHECK(tree.probability(p, Vec3(0), false, 0) == 1);
+  LightQuery query{p, Vec3(0), false, 0.3f};
+  tree.sample(query);
+  CHECK(query.light == 0);
+  CHECK(query.probability == 1);
+  CHECK(tree.probability({p, Vec3(0)}, 0) == 1);
+}
+
+TEST_CASE("Many lights picked together are those picked one by one, to the bit") {
+  Rng rng(7);
+  std::vector<LightBounds> bounds(3000);
+  for (LightBounds& b : bounds) b = randomLight(rng);
+  LightTree tree;
+  tree.build(bounds);
+  for (const size_t count : {size_t(1), size_t(7), size_t(64), size_t(203)}) {
+    std::vector<LightQuery> together(count);
+    for (LightQuery& query : together)
+      query = {12.0f * randomPoint(rng), randomDirection(rng), rng.next() < 0.5f, rng.next()};
+    std::vector<LightQuery> alone = together;
+    tree.sample(together);
+    for (size_t i = 0; i < count; ++i) {
+      tree.sample(alone[i]);
+      CHECK(together[i].light == alone[i].light);
+      CHECK(together[i].probability == alone[i].probability);
+    }
+  }
 }
 
 TEST_CASE("A dim light keeps a chance beside one that is 10^12 times brighter") {
@@ -147,7 +167,7 @@ TEST_CASE("A dim light keeps a chance beside one that is 10^12 times brighter") 
     LightTree tree;
     tree.build(bounds);
     // It may be all that lights this point: the bright one may be hidden.
-    for (uint32_t i = 0; i < 2; ++i) CHECK(tree.probability({0.5f, 1, 0}, {0, -1, 0}, false, i) > 1e-4f);
+    for (uint32_t i = 0; i < 2; ++i) CHECK(tree.probability({{0.5f, 1, 0}, {0, -1, 0}}, i) > 1e-4f);
     CHECK(sumOfProbabilities(tree, 2, {0.5f, 1, 0}, {0, -1, 0}, false) == doctest::Approx(1));
   }
 }
@@ -173,7 +193,7 @@ TEST_CASE("The choice of a light depends neither on the unit of length nor on th
       for (int k = 0; k < 50; ++k) {
         const Vec3 p = 12.0f * randomPoint(points), n = randomDirection(points);
         for (uint32_t i = 0; i < bounds.size(); ++i)
-          different += tree.probability(p, n, k % 2, i) != other.probability(scale * p, n, k % 2, i);
+          different += tree.probability({p, n, k % 2 != 0}, i) != other.probability({scale * p, n, k % 2 != 0}, i);
       }
       CAPTURE(scale);
       CAPTURE(power);

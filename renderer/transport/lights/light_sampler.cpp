@@ -2,6 +2,7 @@
 #include "renderer/transport/lights/light_sampler.h"
 
 #include <algorithm>
+#include <array>
 
 #include "renderer/transport/bsdf/warp.h"
 
@@ -66,7 +67,7 @@ std::vector<float> cumulativeOf(std::vector<double> weight) {
 }
 
 // Picks an interval of a cumulative table; u becomes a fresh variate.
-size_t pick(const std::vector<float>& cumulative, float& u, float& probability) {
+size_t pickInterval(const std::vector<float>& cumulative, float& u, float& probability) {
   const size_t count = cumulative.size() - 1;
   size_t i = 0;
   if (count <= 8) {
@@ -175,24 +176,22 @@ bool LightSampler::samplePunctual(const PunctualLight& light, const Receiver& at
   return !isBlack(out.radiance) && isFinite(out.radiance);
 }
 
-bool LightSampler::sample(const Receiver& at, float uSelect, Vec2 u, LightSample& out) const {
-  if (uSelect < probabilityFinite_) {
-    float select = std::min(uSelect / probabilityFinite_, kOneMinusEpsilon), probability = 0;
-    const size_t light = hierarchy_ ? tree_.sample(at.position, at.normal, at.twoSided, select, probability)
-                                    : pick(cumulative_, select, probability);
-    if (!(probability > 0)) return false;
-    out.light = static_cast<uint32_t>(light);
-    const size_t emitters = scene_.emitters().size();
-    EmissiveTriangle moved;
-    const bool ok = light < emitters ? sampleEmitter(scene_.emitterAt(light, at.time, moved), at, u, out)
-                                     : samplePunctual(scene_.lights()[positional_[light - emitters]], at, out);
-    out.pdfW *= probability * probabilityFinite_;
-    return ok && out.pdfW > 0;
-  }
+bool LightSampler::sampleFinite(const Receiver& at, size_t light, float probability, Vec2 u, LightSample& out) const {
+  if (!(probability > 0)) return false;
+  out.light = static_cast<uint32_t>(light);
+  const size_t emitters = scene_.emitters().size();
+  EmissiveTriangle moved;
+  const bool ok = light < emitters ? sampleEmitter(scene_.emitterAt(light, at.time, moved), at, u, out)
+                                   : samplePunctual(scene_.lights()[positional_[light - emitters]], at, out);
+  out.pdfW *= probability * probabilityFinite_;
+  return ok && out.pdfW > 0;
+}
+
+bool LightSampler::sampleInfinite(const Receiver& at, float uSelect, Vec2 u, LightSample& out) const {
   if (uSelect < probabilityFinite_ + probabilityDirectional_) {
     float select = std::clamp((uSelect - probabilityFinite_) / probabilityDirectional_, 0.0f, kOneMinusEpsilon),
           probability = 0;
-    const size_t index = pick(directionalCumulative_, select, probability);
+    const size_t index = pickInterval(directionalCumulative_, select, probability);
     const PunctualLight& light = scene_.lights()[directional_[index]];
     out.light = firstDirectional() + static_cast<uint32_t>(index);
     out.wi = -placeAt(light, at.time).direction;
@@ -212,9 +211,45 @@ bool LightSampler::sample(const Receiver& at, float uSelect, Vec2 u, LightSample
   return true;
 }
 
+bool LightSampler::sample(const Receiver& at, float uSelect, Vec2 u, LightSample& out) const {
+  if (!(uSelect < probabilityFinite_)) return sampleInfinite(at, uSelect, u, out);
+  float select = std::min(uSelect / probabilityFinite_, kOneMinusEpsilon), probability = 0;
+  if (!hierarchy_) {
+    const size_t light = pickInterval(cumulative_, select, probability);
+    return sampleFinite(at, light, probability, u, out);
+  }
+  LightQuery query = queryOf(at, select);
+  tree_.sample(query);
+  return sampleFinite(at, query.light, query.probability, u, out);
+}
+
+bool LightSampler::sample(const Receiver& at, const LightQuery& picked, Vec2 u, LightSample& out) const {
+  return picked.u < probabilityFinite_ ? sampleFinite(at, picked.light, picked.probability, u, out)
+                                       : sampleInfinite(at, picked.u, u, out);
+}
+
+void LightSampler::pick(std::span<LightQuery> queries) const {
+  for (; queries.size() > LightTree::kMostQueries; queries = queries.subspan(LightTree::kMostQueries))
+    pick(queries.first(LightTree::kMostQueries));
+  // Those that ask for a finite light: what is left of the variate is one of theirs.
+  std::array<LightQuery, LightTree::kMostQueries> finite;
+  size_t count = 0;
+  for (const LightQuery& query : queries)
+    if (query.u < probabilityFinite_) {
+      finite[count] = query;
+      finite[count++].u = std::min(query.u / probabilityFinite_, kOneMinusEpsilon);
+    }
+  tree_.sample({finite.data(), count});
+  count = 0;
+  for (LightQuery& query : queries)
+    if (query.u < probabilityFinite_) {
+      query.light = finite[count].light;
+      query.probability = finite[count++].probability;
+    }
+}
+
 float LightSampler::finiteProbability(const Receiver& at, size_t light) const {
-  if (hierarchy_)
-    return tree_.empty() ? 0 : tree_.probability(at.position, at.normal, at.twoSided, static_cast<uint32_t>(light));
+  if (hierarchy_) return tree_.empty() ? 0 : tree_.probability(queryOf(at, 0), static_cast<uint32_t>(light));
   return cumulative_[light + 1] - cumulative_[light];
 }
 

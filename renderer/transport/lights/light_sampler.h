@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <span>
 #include <vector>
 
 #include "renderer/core/vec.h"
@@ -45,6 +46,13 @@ class LightSampler {
   // Samples a light for a point. False: no light can contribute.
   bool sample(const Receiver& at, float uSelect, Vec2 u, LightSample& out) const;
 
+  // The same in two steps, where there is a hierarchy: pick() walks it for many points at once.
+  static LightQuery queryOf(const Receiver& at, float uSelect) {
+    return {at.position, at.normal, at.twoSided, uSelect};
+  }
+  void pick(std::span<LightQuery> queries) const;
+  bool sample(const Receiver& at, const LightQuery& picked, Vec2 u, LightSample& out) const;
+
   // Density with which sample() would pick the direction to a point hit on emitter `index` (distance in metres, cosine
   // at the light > 0).
   float pdfEmitter(const Receiver& at, size_t index, float distance, float cosLight) const;
@@ -71,6 +79,8 @@ class LightSampler {
   size_t bytes() const { return tree_.bytes() + cumulative_.size() * sizeof(float); }
 
  private:
+  bool sampleFinite(const Receiver& at, size_t light, float probability, Vec2 u, LightSample& out) const;
+  bool sampleInfinite(const Receiver& at, float uSelect, Vec2 u, LightSample& out) const;
   bool sampleEmitter(const EmissiveTriangle& e, const Receiver& at, Vec2 u, LightSample& out) const;
   bool samplePunctual(const PunctualLight& light, const Receiver& at, LightSample& out) const;
   float finiteProbability(const Receiver& at, size_t light) const;

@@ -3,280 +3,220 @@
 
 #include <algorithm>
 #include <array>
-#include <span>
-
-#include "renderer/core/parallel.h"
+#include <cstring>
 
 namespace braid {
 
 namespace {
 
-// Union of two cones (Pharr et al. 2023, section 3.8.4), angles in radians.
-void unionCones(Vec3& axis, float& cosAngle, const Vec3& otherAxis, float otherCos) {
-  const float a = std::acos(std::clamp(cosAngle, -1.0f, 1.0f)), b = std::acos(std::clamp(otherCos, -1.0f, 1.0f));
-  const float between = std::acos(std::clamp(glm::dot(axis, otherAxis), -1.0f, 1.0f));
-  if (std::min(between + b, kPi) <= a) return;
-  if (std::min(between + a, kPi) <= b) {
-    axis = otherAxis;
-    cosAngle = otherCos;
-    return;
-  }
-  const float half = 0.5f * (a + b + between);
-  const Vec3 normal = glm::cross(axis, otherAxis);
-  const float length2 = glm::dot(normal, normal);
-  if (half >= kPi || length2 < 1e-12f) {
-    cosAngle = -1;
-    return;
-  }
-  const float turn = half - a;
-  const Vec3 k = normal / std::sqrt(length2);
-  axis = glm::normalize(axis * std::cos(turn) + glm::cross(k, axis) * std::sin(turn));
-  cosAngle = std::cos(half);
+// As many floats at once as the processor takes, by the vector extension of gcc and clang; conditions choose lane by
+// lane.
+#if defined(__AVX__)
+constexpr int kWidth = 8;
+#else
+constexpr int kWidth = 4;
+#endif
+using Floats = float __attribute__((vector_size(kWidth * sizeof(float))));
+
+// Of a Floats, or of a float.
+template <class F>
+BRAID_INLINE F larger(const F& a, const F& b) {
+  return a < b ? b : a;
 }
-
-LightBounds merge(const LightBounds& a, const LightBounds& b) {
-  if (a.power == 0 && a.bounds.empty()) return b;
-  if (b.power == 0 && b.bounds.empty()) return a;
-  LightBounds m = a;
-  m.bounds.extend(b.bounds);
-  m.power = a.power + b.power;
-  m.range = std::max(a.range, b.range);
-  m.twoSided = a.twoSided || b.twoSided;
-  m.cosEmission = std::min(a.cosEmission, b.cosEmission);
-  unionCones(m.axis, m.cosNormals, b.axis, b.cosNormals);
-  return m;
+template <class F>
+BRAID_INLINE F smaller(const F& a, const F& b) {
+  return b < a ? b : a;
 }
-
-// Surface area orientation heuristic (Conty Estevez and Kulla 2018, Eq. 1).
-float splitCost(const LightBounds& b, const Vec3& parentDiagonal, int dimension) {
-  const float normals = std::acos(std::clamp(b.cosNormals, -1.0f, 1.0f)),
-              emission = std::acos(std::clamp(b.cosEmission, -1.0f, 1.0f));
-  const float w = std::min(normals + emission, kPi);
-  const float sinNormals = std::sin(normals);
-  const float orientation =
-      2 * kPi * (1 - b.cosNormals) +
-      0.5f * kPi * (2 * w * sinNormals - std::cos(normals - 2 * w) - 2 * normals * sinNormals + b.cosNormals);
-  const float longest = maxComponent(parentDiagonal);
-  const float regular = longest / std::max(parentDiagonal[dimension], longest * 1e-6f);
-  const Vec3 d = b.bounds.diagonal();
-  const float area = 2 * (d.x * d.y + d.y * d.z + d.z * d.x);
-  return b.power * orientation * regular * area;
+BRAID_INLINE Floats root(const Floats& x) {
+  Floats r;
+  for (int l = 0; l < kWidth; ++l) r[l] = __builtin_sqrtf(x[l]);
+  return r;
 }
-
-// Looks for the cheapest split of some lights into two, along the axes and between buckets of their centres.
-class SplitSearch {
- public:
-  SplitSearch(const std::vector<LightBounds>& lights, std::span<const uint32_t> chosen)
-      : lights_(lights), chosen_(chosen) {
-    Bounds bounds;
-    for (const uint32_t light : chosen_) {
-      centres_.extend(lights_[light].bounds.centre());
-      bounds.extend(lights_[light].bounds);
-    }
-    extent_ = centres_.diagonal();
-    diagonal_ = bounds.diagonal();
-    for (int d = 0; d < 3; ++d)
-      if (extent_[d] > 0) tryDimension(d);
-  }
-  bool found() const { return dimension_ >= 0; }
-  bool below(uint32_t light) const { return bucketOf(light, dimension_) <= bucket_; }
-
- private:
-  static constexpr int kBuckets = 12;
-
-  int bucketOf(uint32_t light, int dimension) const {
-    const float f = (lights_[light].bounds.centre()[dimension] - centres_.lo[dimension]) / extent_[dimension];
-    return std::clamp(static_cast<int>(f * kBuckets), 0, kBuckets - 1);
-  }
-
-  void tryDimension(int dimension) {
-    std::array<LightBounds, kBuckets> bucket, above;
-    for (const uint32_t light : chosen_) {
-      LightBounds& b = bucket[static_cast<size_t>(bucketOf(light, dimension))];
-      b = merge(b, lights_[light]);
-    }
-    above[kBuckets - 1] = bucket[kBuckets - 1];
-    for (size_t i = kBuckets - 1; i-- > 1;) above[i] = merge(bucket[i], above[i + 1]);
-    LightBounds below;
-    for (size_t i = 0; i + 1 < kBuckets; ++i) {
-      below = merge(below, bucket[i]);
-      if (below.bounds.empty() || above[i + 1].bounds.empty()) continue;
-      const float cost = splitCost(below, diagonal_, dimension) + splitCost(above[i + 1], diagonal_, dimension);
-      if (!(cost < best_)) continue;
-      best_ = cost;
-      dimension_ = dimension;
-      bucket_ = static_cast<int>(i);
-    }
-  }
-
-  const std::vector<LightBounds>& lights_;
-  std::span<const uint32_t> chosen_;
-  Bounds centres_;
-  Vec3 extent_, diagonal_;
-  float best_ = kInfinity;
-  int dimension_ = -1, bucket_ = 0;
-};
-
-// Sorts the lights of a node into its two children; the number of the left one's.
-size_t splitLights(const std::vector<LightBounds>& lights, std::span<uint32_t> order, int depth) {
-  // Deeper than any useful hierarchy: halves, so that the recursion ends.
-  constexpr int kMostDepth = 48;
-  size_t left = 0;
-  if (depth < kMostDepth) {
-    const SplitSearch search(lights, order);
-    if (search.found()) {
-      const auto split =
-          std::partition(order.begin(), order.end(), [&](uint32_t light) { return search.below(light); });
-      left = static_cast<size_t>(split - order.begin());
-    }
-  }
-  return left == 0 || left == order.size() ? order.size() / 2 : left;
-}
+// sqrt(1 - x²), 0 where rounding makes that negative.
+BRAID_INLINE Floats otherLeg(const Floats& x) { return root(larger(1 - x * x, Floats{})); }
 
 // The share of the left one of two nodes. A node that may contribute keeps a chance worth a float's digits: the other,
 // however bright, may be hidden.
-float leftProbability(float left, float right) {
+template <class F>
+BRAID_INLINE F leftShare(const F& left, const F& right) {
   constexpr float kLeast = 0x1p-10f;
-  const float p = left / (left + right);
-  return left > 0 && right > 0 ? std::clamp(p, kLeast, 1 - kLeast) : p;
+  const F p = left / (left + right), clamped = smaller(larger(p, F{} + kLeast), F{} + (1 - kLeast));
+  return left > 0 && right > 0 ? clamped : p;
+}
+
+// `probability` times a node's share, or 0 if neither node can contribute.
+template <class F>
+BRAID_INLINE F timesShare(const F& probability, const F& share, const F& left, const F& right) {
+  const F sum = left + right;
+  return sum > 0 && sum < kInfinity ? probability * share : F{};
+}
+
+// Picks one of two nodes by u, which becomes a fresh variate, without branches: no predictor would learn them. Returns
+// whether it is the left one.
+template <class F>
+BRAID_INLINE auto pickLeft(const F& left, const F& right, F& u, F& probability) {
+  const F share = leftShare(left, right);
+  const auto isLeft = u < share;
+  const F width = isLeft ? share : 1 - share, from = isLeft ? F{} : share;
+  u = smaller(larger((u - from) / width, F{}), F{} + kOneMinusEpsilon);
+  probability = timesShare(probability, width, left, right);
+  return isLeft;
+}
+
+// Angles between 0 and pi by their sines and cosines.
+struct Angles {
+  Floats sine, cosine;
+};
+// Of max(0, a - b).
+BRAID_INLINE Floats cosOfDifference(const Angles& a, const Angles& b) {
+  return a.cosine > b.cosine ? Floats{} + 1 : a.cosine * b.cosine + a.sine * b.sine;
+}
+BRAID_INLINE Floats sinOfDifference(const Angles& a, const Angles& b) {
+  return a.cosine > b.cosine ? Floats{} : a.sine * b.cosine - a.cosine * b.sine;
+}
+
+// Fetches a group while nothing waits for it.
+template <class Group>
+BRAID_INLINE void prefetch(const Group& group) {
+  for (size_t byte = 0; byte < sizeof(Group); byte += 64)
+    __builtin_prefetch(reinterpret_cast<const char*>(&group) + byte);
 }
 
 }  // namespace
 
-void LightTree::build(const std::vector<LightBounds>& lights) {
-  nodes_.clear();
-  position_.assign(lights.size(), ~0u);
-  std::vector<uint32_t> order;
-  for (uint32_t i = 0; i < lights.size(); ++i)
-    if (lights[i].power > 0) order.push_back(i);
-  if (order.empty()) return;
-  nodes_.resize(2 * order.size() - 1);
-  buildNode(lights, order, 0, 0);
-  for (uint32_t i = 0; i < order.size(); ++i) position_[order[i]] = i;
-}
+void LightTree::importances(const Group& group, const LightQuery& query, float (&out)[kLanes]) {
+  const Vec3 &p = query.position, &n = query.normal;
+  const Floats least = Floats{} + 1e-4f;
+  for (int first = 0; first < kLanes; first += kWidth) {
+    const auto of = [&](const float(Group::*member)[kLanes]) {
+      Floats v;
+      std::memcpy(&v, &(group.*member)[first], sizeof(v));
+      return v;
+    };
+    const Floats dx = p.x - of(&Group::centreX), dy = p.y - of(&Group::centreY), dz = p.z - of(&Group::centreZ);
+    const Floats radius = of(&Group::radius);
+    const Floats distance = root(dx * dx + dy * dy + dz * dz), inverse = 1 / distance;
+    const Floats wx = dx * inverse, wy = dy * inverse, wz = dz * inverse;
+    const Floats sinBound = radius * inverse;
+    const Angles bound{sinBound, otherLeg(sinBound)};
 
-LightBounds LightTree::buildNode(const std::vector<LightBounds>& lights, std::span<uint32_t> order, size_t node,
-                                 int depth) {
-  LightBounds total;
-  size_t left = 0;
-  if (order.size() == 1) {
-    total = lights[order[0]];
-  } else {
-    left = splitLights(lights, order, depth);
-    LightBounds l, r;
-    const auto buildLeft = [&] { l = buildNode(lights, order.first(left), node + 1, depth + 1); };
-    const auto buildRight = [&] { r = buildNode(lights, order.subspan(left), node + 2 * left, depth + 1); };
-    if (order.size() > 4096) {
-      parallelBoth(buildLeft, buildRight);
-    } else {
-      buildLeft();
-      buildRight();
+    const Floats along = of(&Group::axisX) * wx + of(&Group::axisY) * wy + of(&Group::axisZ) * wz;
+    const Floats cosAxis = of(&Group::twoSided) != 0 ? larger(along, -along) : along;
+    const Angles axis{otherLeg(cosAxis), cosAxis}, normals{of(&Group::sinNormals), of(&Group::cosNormals)};
+    const Floats cosEmit = cosOfDifference({sinOfDifference(axis, normals), cosOfDifference(axis, normals)}, bound);
+    const Floats part = (distance - radius) * of(&Group::inverseRange), part2 = part * part;
+    // Slack on the cosines: rounding must not turn a light that contributes a little into one that is never chosen.
+    Floats value = of(&Group::power) * (inverse * inverse) * larger(cosEmit, least) * larger(1 - part2 * part2, least);
+    value = part > 1 + 1e-5f ? Floats{} : value;
+    value = cosEmit <= of(&Group::cosEmission) ? Floats{} : value;
+    if (n != Vec3(0)) {
+      const Floats facing = -(wx * n.x + wy * n.y + wz * n.z);
+      const Floats cosReceive = query.twoSided ? larger(facing, -facing) : facing;
+      const Floats received = cosOfDifference({otherLeg(cosReceive), cosReceive}, bound);
+      value = received < -1e-5f ? Floats{} : value * larger(received, least);
     }
-    total = merge(l, r);
+    value = distance <= radius ? of(&Group::inside) : value;
+    std::memcpy(&out[first], &value, sizeof(value));
   }
-  Node& n = nodes_[node];
-  n.centre = total.bounds.centre();
-  n.radius = 0.5f * glm::length(total.bounds.diagonal());
-  n.axis = total.axis;
-  n.power = total.power;
-  n.range = total.range;
-  n.cosNormals = total.cosNormals;
-  n.cosEmission = total.cosEmission;
-  n.twoSided = total.twoSided;
-  n.leftLeaves = static_cast<uint32_t>(left);
-  n.light = left == 0 ? order[0] : ~0u;
-  return total;
 }
 
-float LightTree::importance(const Node& node, const Vec3& p, const Vec3& n, bool twoSided) const {
-  const Vec3 d = p - node.centre;
-  const float distance2 = glm::dot(d, d), radius2 = sqr(node.radius);
-  const float clamped2 = std::max(distance2, radius2);
-  if (!(clamped2 > 0)) return node.power;
-  if (distance2 <= radius2) return node.power / clamped2;  // inside the sphere nothing is known of directions
+// Queries on their way, as far as the place that each has in the arrays.
+struct LightTree::Walks {
+  alignas(64) float u[kMostQueries] = {}, probability[kMostQueries] = {};
+  uint32_t at[kMostQueries], query[kMostQueries];
+  uint8_t lane[kMostQueries];
 
-  const float inverseDistance = 1 / std::sqrt(distance2);
-  const Vec3 w = d * inverseDistance;
-  const float sin2Bound = radius2 / distance2;
-  const float sinBound = std::sqrt(sin2Bound), cosBound = safeSqrt(1 - sin2Bound);
-  // cos(max(0, a - b)) for angles given by cosine and sine.
-  const auto cosMinus = [](float sinA, float cosA, float sinB, float cosB) {
-    return cosA > cosB ? 1.0f : cosA * cosB + sinA * sinB;
-  };
-  const auto sinMinus = [](float sinA, float cosA, float sinB, float cosB) {
-    return cosA > cosB ? 0.0f : sinA * cosB - cosA * sinB;
-  };
-
-  float cosAxis = glm::dot(node.axis, w);
-  if (node.twoSided) cosAxis = std::abs(cosAxis);
-  const float sinAxis = safeSqrt(1 - sqr(cosAxis)), sinNormals = safeSqrt(1 - sqr(node.cosNormals));
-  const float cosX = cosMinus(sinAxis, cosAxis, sinNormals, node.cosNormals),
-              sinX = sinMinus(sinAxis, cosAxis, sinNormals, node.cosNormals);
-  const float cosEmit = cosMinus(sinX, cosX, sinBound, cosBound);
-  if (cosEmit <= node.cosEmission) return 0;
-  // Slack on both cosines: rounding must not turn a light that contributes a little into one that is never chosen.
-  float value = node.power * std::max(cosEmit, 1e-4f) / clamped2;
-  if (node.range < kInfinity) {
-    const float part = (std::sqrt(distance2) - node.radius) / node.range;
-    if (part > 1 + 1e-5f) return 0;
-    value *= std::max(1 - sqr(sqr(part)), 1e-4f);
-  }
-  if (n != Vec3(0)) {
-    float cosReceive = -glm::dot(w, n);
-    if (twoSided) cosReceive = std::abs(cosReceive);
-    const float sinReceive = safeSqrt(1 - sqr(cosReceive));
-    const float bound = cosMinus(sinReceive, cosReceive, sinBound, cosBound);
-    if (bound < -1e-5f) return 0;
-    value *= std::max(bound, 1e-4f);
-  }
-  return value;
-}
-
-uint32_t LightTree::sample(const Vec3& p, const Vec3& n, bool twoSided, float& u, float& probability) const {
-  size_t i = 0;
-  probability = 1;
-  while (nodes_[i].leftLeaves > 0) {
-    const size_t left = i + 1, right = i + 2 * nodes_[i].leftLeaves;
-    const float a = importance(nodes_[left], p, n, twoSided), b = importance(nodes_[right], p, n, twoSided);
-    const float sum = a + b;
-    if (!(sum > 0) || !std::isfinite(sum)) {
-      probability = 0;
-      return 0;
-    }
-    const float pLeft = leftProbability(a, b);
-    if (u < pLeft) {
-      u = std::min(u / pLeft, kOneMinusEpsilon);
-      probability *= pLeft;
-      i = left;
-    } else {
-      u = std::clamp((u - pLeft) / (1 - pLeft), 0.0f, kOneMinusEpsilon);
-      probability *= 1 - pLeft;
-      i = right;
+  // For the walks from `first` on: one of two nodes, whose importances are those of `left` and the next lane.
+  void pick(size_t first, const float (&importance)[kTogether][kLanes], const uint8_t (&left)[kTogether]) {
+    for (size_t k = 0; k < kTogether; k += kWidth) {
+      Floats a, b, own, chance;
+      for (size_t l = 0; l < kWidth; ++l) {
+        a[l] = importance[k + l][left[k + l]];
+        b[l] = importance[k + l][left[k + l] + 1];
+      }
+      std::memcpy(&own, &u[first + k], sizeof(own));
+      std::memcpy(&chance, &probability[first + k], sizeof(chance));
+      const auto isLeft = pickLeft(a, b, own, chance);
+      std::memcpy(&u[first + k], &own, sizeof(own));
+      std::memcpy(&probability[first + k], &chance, sizeof(chance));
+      for (size_t l = 0; l < kWidth; ++l) lane[first + k + l] = static_cast<uint8_t>(left[k + l] + 1 + isLeft[l]);
     }
   }
-  return nodes_[i].light;
+};
+
+void LightTree::sample(LightQuery& query) const {
+  float u = query.u;
+  query.probability = 1;
+  uint32_t at = root_;
+  while (!(at & kLeaf) && query.probability > 0) {
+    float importance[kLanes];
+    importances(groups_[at], query, importance);
+    const size_t child = pickLeft(importance[0], importance[1], u, query.probability) ? 0 : 2;
+    const size_t left = 2 + child;
+    at = groups_[at].next[pickLeft(importance[left], importance[left + 1], u, query.probability) ? child : child + 1];
+  }
+  query.light = at & ~kLeaf;
 }
 
-float LightTree::probability(const Vec3& p, const Vec3& n, bool twoSided, uint32_t light) const {
+void LightTree::sample(std::span<LightQuery> queries) const {
+  for (; queries.size() > kMostQueries; queries = queries.subspan(kMostQueries)) sample(queries.first(kMostQueries));
+  Walks walks;
+  for (size_t i = 0; i < queries.size(); ++i) {
+    queries[i].light = root_ & ~kLeaf;
+    queries[i].probability = 1;
+    walks.u[i] = queries[i].u;
+    walks.probability[i] = 1;
+    walks.at[i] = root_;
+    walks.query[i] = static_cast<uint32_t>(i);
+  }
+  for (size_t count = root_ & kLeaf ? 0 : queries.size(); count > 0;) {
+    size_t alive = 0;
+    for (size_t first = 0; first < count; first += kTogether)
+      alive = step(walks, first, std::min(count, first + kTogether), alive, queries);
+    count = alive;
+  }
+}
+
+size_t LightTree::step(Walks& walks, size_t first, size_t end, size_t alive, std::span<LightQuery> queries) const {
+  float importance[kTogether][kLanes] = {};  // of no walk: 0, for arithmetic on what memory held may be slow
+  uint8_t left[kTogether] = {};
+  for (size_t w = first; w < end; ++w)
+    importances(groups_[walks.at[w]], queries[walks.query[w]], importance[w - first]);
+  walks.pick(first, importance, left);
+  for (size_t w = first; w < end; ++w) left[w - first] = static_cast<uint8_t>(2 + 2 * walks.lane[w]);
+  walks.pick(first, importance, left);
+  for (size_t w = first; w < end; ++w) {
+    const uint32_t next = groups_[walks.at[w]].next[walks.lane[w] - 2];
+    LightQuery& query = queries[walks.query[w]];
+    query.light = next & ~kLeaf;
+    query.probability = walks.probability[w];
+    walks.u[alive] = walks.u[w];
+    walks.probability[alive] = walks.probability[w];
+    walks.query[alive] = walks.query[w];
+    walks.at[alive] = next;
+    const bool goesOn = (next & kLeaf) == 0 && query.probability > 0;
+    if (goesOn) prefetch(groups_[next]);
+    alive += goesOn;
+  }
+  return alive;
+}
+
+float LightTree::probability(const LightQuery& query, uint32_t light) const {
   const uint32_t target = position_[light];
   if (target == ~0u) return 0;
-  size_t i = 0;
-  uint32_t first = 0;
   float result = 1;
-  while (nodes_[i].leftLeaves > 0) {
-    const size_t left = i + 1, right = i + 2 * nodes_[i].leftLeaves;
-    const float a = importance(nodes_[left], p, n, twoSided), b = importance(nodes_[right], p, n, twoSided);
-    const float sum = a + b;
-    if (!(sum > 0) || !std::isfinite(sum)) return 0;
-    const float pLeft = leftProbability(a, b);
-    if (target < first + nodes_[i].leftLeaves) {
-      result *= pLeft;
-      i = left;
-    } else {
-      result *= 1 - pLeft;
-      first += nodes_[i].leftLeaves;
-      i = right;
-    }
+  for (uint32_t at = root_; !(at & kLeaf) && result > 0;) {
+    const Group& group = groups_[at];
+    float importance[kLanes];
+    importances(group, query, importance);
+    const uint32_t child = target >= group.rightLeaves[0], right = target >= group.rightLeaves[1 + child];
+    const auto take = [&](float a, float b, bool isRight) {
+      const float share = leftShare(a, b);
+      result = timesShare(result, isRight ? 1 - share : share, a, b);
+    };
+    take(importance[0], importance[1], child != 0);
+    take(importance[2 + 2 * child], importance[3 + 2 * child], right != 0);
+    at = group.next[2 * child + right];
   }
   return result;
 }

@@ -26,35 +26,71 @@ struct LightBounds {
   bool twoSided = false;
 };
 
+// A point that a light is to be picked for, and the light.
+struct LightQuery {
+  Vec3 position;
+  Vec3 normal;            // zero: no receiver cosine
+  bool twoSided = false;  // both sides of the normal receive
+  float u = 0;            // a uniform variate
+  uint32_t light = 0;
+  float probability = 0;  // of the light; 0: nothing can contribute
+};
+
 class LightTree {
  public:
+  static constexpr size_t kMostQueries = 64;  // that are worked on at once
+
   void build(const std::vector<LightBounds>& lights);
-  bool empty() const { return nodes_.empty(); }
+  bool empty() const { return position_.empty(); }
 
-  // Picks a light for the point p with normal n (zero: no receiver cosine; `twoSided`: both sides of n receive). u is
-  // rescaled to a fresh variate. Returns the light and its probability; probability 0: nothing can contribute.
-  uint32_t sample(const Vec3& p, const Vec3& n, bool twoSided, float& u, float& probability) const;
-  float probability(const Vec3& p, const Vec3& n, bool twoSided, uint32_t light) const;
+  // Picks a light.
+  void sample(LightQuery& query) const;
+  // The same for each of the queries. Many at a time take half the time: a step from a node to the next is a
+  // long chain of operations, and the processor works on the chains of several queries at once.
+  void sample(std::span<LightQuery> queries) const;
+  // The probability that the query picks `light`.
+  float probability(const LightQuery& query, uint32_t light) const;
 
-  size_t bytes() const { return nodes_.size() * sizeof(Node) + position_.size() * sizeof(uint32_t); }
+  size_t bytes() const { return groups_.size() * sizeof(Group) + position_.size() * sizeof(uint32_t); }
 
  private:
+  // A node, its children and theirs are met together: what importance() reads of six nodes lies side by side.
+  // Lanes 0 and 1 are the children, 2 and 3 those of the left one, 4 and 5 those of the right one. A child that is a
+  // leaf has itself and nothing below.
+  static constexpr int kLanes = 8;  // as vectors are wide; two are never read
+  struct Group {
+    float centreX[kLanes], centreY[kLanes], centreZ[kLanes], radius[kLanes];
+    float axisX[kLanes], axisY[kLanes], axisZ[kLanes];
+    float power[kLanes], inside[kLanes], inverseRange[kLanes];
+    float cosNormals[kLanes], sinNormals[kLanes], cosEmission[kLanes];
+    float twoSided[kLanes];   // 0 or 1
+    uint32_t next[4];         // of lanes 2 to 5: a light with kLeaf, or the group below
+    uint32_t rightLeaves[3];  // number of the first leaf of the right child: of the node, the left and the right child
+  };
+  static constexpr uint32_t kLeaf = 1u << 31;
+
   struct Node {
-    Vec3 centre;
-    float radius;
-    Vec3 axis;
-    float power;
-    float range;
-    float cosNormals, cosEmission;
+    LightBounds bounds;
     uint32_t leftLeaves;  // leaves of the left child (which follows the node); 0: a leaf
     uint32_t light;       // of a leaf
-    bool twoSided;
   };
-  float importance(const Node& node, const Vec3& p, const Vec3& n, bool twoSided) const;
+  // Depth first: the left child at +1, the right child at +2·leftLeaves.
+  using Nodes = std::vector<Node>;
   // Builds the node of some lights and those below it; sorts `order` into the order of the leaves.
-  LightBounds buildNode(const std::vector<LightBounds>& lights, std::span<uint32_t> order, size_t node, int depth);
+  static void buildNode(const std::vector<LightBounds>& lights, std::span<uint32_t> order, Nodes& nodes, size_t node,
+                        int depth);
+  // The group of a node and those below it; its leaves are numbered from firstLeaf.
+  uint32_t addGroup(const Nodes& nodes, size_t node, uint32_t firstLeaf);
+  static void setLane(Group& group, size_t lane, const Node& node);
 
-  std::vector<Node> nodes_;         // depth first: left child at +1, right child at +2·leftLeaves
+  static constexpr size_t kTogether = 8;  // steps that do not wait for each other
+  struct Walks;
+  // One step of the walks from `first` to `end`; those that go on move up to `alive`. Returns where the next may go.
+  size_t step(Walks& walks, size_t first, size_t end, size_t alive, std::span<LightQuery> queries) const;
+  static void importances(const Group& group, const LightQuery& query, float (&out)[kLanes]);
+
+  uint32_t root_ = kLeaf;           // as Group::next; without any light that shines, light 0
+  std::vector<Group> groups_;       // depth first
   std::vector<uint32_t> position_;  // of each light among the leaves
 };
 
