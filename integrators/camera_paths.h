@@ -5,11 +5,20 @@
 
 #include <optional>
 
-#include "integrators/path_sample.h"
+#include "renderer/session/integrator.h"
 #include "renderer/session/plan.h"
 #include "renderer/transport/subpath.h"
 
 namespace braid {
+
+// What one camera path returns.
+struct PathSample {
+  Spectrum radiance{0};
+  Spectrum direct{0};     // the direct part of it
+  float coverage = 1;     // 0 when the camera ray misses everything
+  bool onGround = false;  // of a shadow catcher: the radiance says how much of it is in shadow
+  FeatureSample features;
+};
 
 // The ray of a sample of pixel (x, y) of the full frame at a time; its place in the pixel follows the plan's filter.
 // `camera` is block 0 of the sample's random numbers.

@@ -8,8 +8,8 @@
 // integrators follow the same conventions for hits, media, null interfaces, panes and termination.
 #pragma once
 
+#include "integrators/camera_paths.h"
 #include "integrators/guiding/guide_record.h"
-#include "integrators/path_sample.h"
 #include "integrators/path_state.h"
 #include "renderer/session/integrator.h"
 #include "renderer/transport/visibility.h"
