@@ -45,8 +45,8 @@ class LightTree {
 
   // Picks a light.
   void sample(LightQuery& query) const;
-  // The same for each of the queries. Many at a time take half the time: a step from a node to the next is a
-  // long chain of operations, and the processor works on the chains of several queries at once.
+  // The same for each of the queries, the more the better: a step from a node to the next is a long chain of
+  // operations, and the processor works on the chains of several queries at once.
   void sample(std::span<LightQuery> queries) const;
   // The probability that the query picks `light`.
   float probability(const LightQuery& query, uint32_t light) const;
