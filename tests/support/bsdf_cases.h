@@ -96,6 +96,21 @@ inline SurfaceParameters withDiffuseTransmission(SurfaceParameters p, float amou
   return p;
 }
 
+inline SurfaceParameters specularGlossiness() {
+  SurfaceParameters p = plastic(0.4f);
+  p.lobes |= kLobeSpecularGlossiness;
+  p.specularF0 = Spectrum(0.5f, 0.3f, 0.2f);
+  return p;
+}
+
+inline SurfaceParameters tintedSpecular() {
+  SurfaceParameters p = plastic(0.3f);
+  p.specular = 0.7f;
+  p.specularColor = Spectrum(4, 1, 0.2f);
+  p.etaInside = 2;
+  return p;
+}
+
 inline std::vector<BsdfCase> bsdfCases() {
   std::vector<BsdfCase> cases = {{"diffuse", lambert()},
                                  {"leaf", withDiffuseTransmission(lambert(), 0.4f)},
@@ -139,15 +154,8 @@ inline std::vector<BsdfCase> bsdfCases() {
   cases.push_back(
       {"everything",
        withClearcoat(withSheen(withFilm(withAnisotropy(metal(0.4f, 0.3f), 0.5f, 1), 500), 0.5f), 0.15f, 0.7f)});
-  SurfaceParameters old = plastic(0.4f);
-  old.lobes |= kLobeSpecularGlossiness;
-  old.specularF0 = Spectrum(0.5f, 0.3f, 0.2f);
-  cases.push_back({"specular-glossiness", old});
-  SurfaceParameters tinted = plastic(0.3f);
-  tinted.specular = 0.7f;
-  tinted.specularColor = Spectrum(4, 1, 0.2f);
-  tinted.etaInside = 2;
-  cases.push_back({"tinted specular", tinted});
+  cases.push_back({"specular-glossiness", specularGlossiness()});
+  cases.push_back({"tinted specular", tintedSpecular()});
   return cases;
 }
 
