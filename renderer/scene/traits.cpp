@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "renderer/scene/data/lobes.h"
+#include "renderer/scene/file_parts.h"
 #include "renderer/scene/scene.h"
 
 namespace braid {
@@ -34,6 +35,8 @@ std::vector<std::string> SceneTraits::names() const {
     if (has(1u << i)) list.push_back(kNames[i]);
   for (const LobeEntry& entry : kLobeTable)
     if (entry.trait && hasLobe(entry.lobe)) list.push_back(entry.trait);
+  for (size_t i = 0; i < kFileParts; ++i)
+    if (parts[i] > 0) list.push_back(kFilePartTable[i].trait);
   return list;
 }
 
@@ -63,6 +66,7 @@ uint32_t materialFlags(const Material& m) {
 
 void Scene::detectTraits() {
   SceneTraits& t = traits_;
+  t.parts = data_.parts;
   std::vector<uint64_t> groupTriangles(groups_.size(), 0);
   const auto addMesh = [&](uint32_t m) {
     const TriangleMesh& mesh = data_.meshes[m];

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "renderer/core/vec.h"
+#include "renderer/scene/data/scene_data.h"
 
 namespace braid {
 
@@ -39,13 +40,14 @@ struct SceneTraits {
   uint64_t emissiveTriangles = 0;
   uint64_t punctualLights = 0;
   uint64_t instances = 0, meshes = 0, materials = 0, textures = 0;
+  FilePartCounts parts{};         // what the file held
   float smallestEmitterArea = 0;  // m², 0 when none
   Vec3 centre{0};                 // bounding sphere of the scene, metres
   float radius = 0;
 
   bool has(uint32_t flag) const { return (flags & flag) != 0; }
   bool hasLobe(uint32_t lobe) const { return (lobes & lobe) != 0; }
-  // The names of the set flags and lobes.
+  // The names of the set flags and lobes, and of what the file held.
   std::vector<std::string> names() const;
 };
 

@@ -8,6 +8,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/hash.h"
+#include "renderer/scene/file_parts.h"
 #include "renderer/session/film_of_plan.h"
 #include "renderer/session/integrator.h"
 #include "renderer/session/pixel_filter.h"
@@ -71,6 +72,15 @@ void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
                         : settings.lightStrategy == LightStrategy::Power
                             ? "lights are chosen by power on request"
                             : fmt::format("{} finite lights: chosen by power", finite)});
+}
+
+// What the loader had to do, or was spared.
+void planFileParts(const SceneTraits& traits, Plan& plan) {
+  for (size_t i = 0; i < kFileParts; ++i) {
+    const FilePartEntry& e = kFilePartTable[i];
+    const uint64_t count = traits.parts[i];
+    plan.lines.push_back({count > 0, e.part, count > 0 ? fmt::format("{}: {}", e.kept, count) : e.left});
+  }
 }
 
 void requireShadowAlpha(const Scene& scene, const Settings& settings) {
@@ -222,6 +232,7 @@ Plan makePlan(const Scene& scene, const CameraData& camera, const Settings& sett
   for (const PlannedIntegrator& p : plan.integrators)
     for (PlanLine& line : p.integrator->planLines(plan)) plan.lines.push_back(std::move(line));
   planSceneParts(scene, settings, plan);
+  planFileParts(scene.traits(), plan);
   planSmoothSolids(scene, plan);
   planMotion(scene, plan);
   planView(scene, plan);

@@ -2,6 +2,7 @@
 // What a loader hands to Scene: plain, validated data in metres. Tests and benchmarks build it by hand.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -116,6 +117,20 @@ struct SceneMotion {
   bool any() const { return !times.empty(); }
 };
 
+// What most files do without and a loader has work with, as indices of SceneData::parts. file_parts.h has their words.
+enum class FilePart : uint8_t {
+  Ktx2Images,
+  AvifImages,
+  MeshoptViews,
+  DracoPrimitives,
+  AnimatedProperties,  // of materials, cameras, lights, visibility: what KHR_animation_pointer moves in this pose
+  HiddenNodes,
+  RoundPrimitives,  // points and lines as spheres and rods
+  ImageBasedLight
+};
+inline constexpr size_t kFileParts = 8;
+using FilePartCounts = std::array<uint64_t, kFileParts>;
+
 struct SceneData {
   std::string file;
   // Where the zero of all positions here lies in the coordinates of the file: a scene far from the file's own zero is
@@ -131,6 +146,7 @@ struct SceneData {
   std::optional<Spectrum> backdrop;  // what the camera sees of the environment; none: the environment
   std::optional<Spectrum> ground;    // radiance of the ground where nothing shadows it; none: there is no ground
   SceneMotion motion;
+  FilePartCounts parts{};
 
   // For `braid info`.
   std::vector<std::string> extensionsUsed, extensionsRequired, extensionsIgnored;

@@ -68,6 +68,7 @@ struct SceneFile::Opened {
   std::vector<Material> materials;
   std::vector<CameraData> cameras;
   std::vector<PunctualLight> lights;
+  FilePartCounts parts{};
   Report report;
   Usage usage;
   ContentHash hash;
@@ -79,6 +80,7 @@ struct SceneFile::Opened {
       document.cameras = cameras;
       document.lights = lights;
     }
+    document.parts = parts;
     document.report = report;
     document.usage = usage;
     document.hash = hash;
@@ -105,6 +107,7 @@ SceneFile::SceneFile(const std::string& path, const LoadOptions& options, const 
   opened_->materials = document.materials;
   opened_->cameras = document.cameras;
   opened_->lights = document.lights;
+  opened_->parts = document.parts;
   opened_->report = document.report;
   opened_->usage = document.usage;
   opened_->hash = document.hash;
@@ -129,6 +132,7 @@ SceneData SceneFile::pose(std::optional<float> frameTime) {
     document.report.throwIfBroken(document.path, &document.usage);
     document.report.throwIfBroken(document.path);
   }
+  scene.parts = document.parts;
   addDefaults(scene, options, document.report);
   scene.contentHash = document.hash.value();
   scene.warnings = document.report.lines(document.usage, true);

@@ -121,6 +121,8 @@ void ImageTable::report(int image, const char* meanwhile) {
   if (!item.problem.empty()) document_.report.problem(place, item.problem, meanwhile);
   if (!item.note.empty()) document_.report.problem(place, item.note, "that file is read");
   if (!item.image) return;
+  if (item.image->format == "ktx2") document_.count(FilePart::Ktx2Images);
+  if (item.image->format == "avif") document_.count(FilePart::AvifImages);
   if (item.image->limited > 0)
     document_.report.warn(place, std::to_string(item.image->limited) +
                                      " values are not finite, negative or above 1e18; they are limited");

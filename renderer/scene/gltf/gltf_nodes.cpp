@@ -47,7 +47,10 @@ class SceneBuilder {
     scene_.motion = poses_.motion;
     for (const int node : nodes) {
       views_.addCamera(node, poses_);
-      if (!poses_.first.visible[static_cast<size_t>(node)]) continue;
+      if (!poses_.first.visible[static_cast<size_t>(node)]) {
+        document_.count(FilePart::HiddenNodes);
+        continue;
+      }
       views_.addLight(node, poses_);
       if (nodeAt(node).mesh >= 0) addMesh(node);
     }
@@ -146,6 +149,8 @@ class SceneBuilder {
       job.later.push_back(
           {morphs ? poses_.later[k - 1].weights[i] : job.weights, skin >= 0 ? jointsOf(skin, k) : nullptr});
     budget((1 + job.later.size()) * estimatedBytes(document_, primitive));
+    if (isPacked(primitive)) document_.count(FilePart::DracoPrimitives);
+    if (primitive.mode < 4 && options_.pointRadius > 0) document_.count(FilePart::RoundPrimitives);
     useData(primitive);
     job.material = materials_.use(materialOf(primitive));
     job.uvs = materials_.uvs(job.material);

@@ -203,6 +203,7 @@ void readImageBasedLight(Document& document) {
   document.usage.mark("image-based lights", light);
   const Value& lights = member(member(document.model.extensions, kName), "lights");
   document.environment = ImageBasedLight(document, lights.Get(light), place).read();
+  if (document.environment) document.count(FilePart::ImageBasedLight);
 }
 
 }  // namespace braid::gltf

@@ -31,7 +31,9 @@ TEST_CASE("gltf: Draco meshes") {
       {"indices", indices},
       {"extensions", {{"KHR_draco_mesh_compression", {{"bufferView", view}, {"attributes", {{"POSITION", 0}}}}}}}};
   SUBCASE("decode") {
-    const TriangleMesh decoded = onlyMesh(file.load());
+    const SceneData scene = file.load();
+    CHECK(scene.parts[static_cast<size_t>(FilePart::DracoPrimitives)] == 1);
+    const TriangleMesh decoded = onlyMesh(scene);
     CHECK(decoded.triangles.size() == 2);
     CHECK(decoded.positions.size() == 4);
     Bounds bounds;
@@ -85,6 +87,7 @@ TEST_CASE("gltf: meshopt compression with a fallback buffer that has no data") {
     const SceneData scene = file.load();
     CHECK(onlyMesh(scene).triangles.size() == 2);
     CHECK(onlyMesh(scene).positions[2] == Vec3(1, 1, 0));
+    CHECK(scene.parts[static_cast<size_t>(FilePart::MeshoptViews)] == 2);
 
     Json& extension = file.root["bufferViews"][static_cast<size_t>(vertexView)]["extensions"][name];
     extension["count"] = 1e9;

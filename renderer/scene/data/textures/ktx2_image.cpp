@@ -24,6 +24,7 @@ std::shared_ptr<const Image> decodeKtx2(const uint8_t* data, size_t bytes, const
   ktx2::Picture picture = ktx2::decode({data, bytes});
   facts = {picture.srgb, picture.isSeveral, picture.isRedGreen};
   auto image = std::make_shared<Image>();
+  image->format = "ktx2";
   image->name = name;
   image->width = picture.width;
   image->height = picture.height;

@@ -171,6 +171,7 @@ std::shared_ptr<Image> readPixels(ImageReader& reader, const std::string& name, 
   checkImageSize(header.width, header.height, static_cast<int>(header.channels.size()), packing * fileBytes);
   auto image = std::make_shared<Image>();
   image->name = name;
+  image->format = reader.format();
   image->width = header.width;
   image->height = header.height;
   image->channels = keptChannels(header);

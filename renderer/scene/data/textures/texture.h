@@ -16,6 +16,7 @@ namespace braid {
 // Decoded pixels, row 0 at the top (glTF: uv (0,0) is the upper left corner). Exactly one of bytes/floats is filled.
 struct Image {
   std::string name;
+  std::string format;  // of the file, as ImageReader::format(), "webp" or "ktx2"; empty: it is of no file
   int width = 0, height = 0;
   int channels = 0;  // 1 grey, 2 grey+alpha, 3 RGB, 4 RGBA
   std::vector<uint8_t> bytes;

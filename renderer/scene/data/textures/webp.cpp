@@ -42,6 +42,7 @@ std::shared_ptr<const Image> decodeWebp(const uint8_t* data, size_t bytes, const
   if (WebPGetFeatures(data, bytes, &features) != VP8_STATUS_OK) failBroken();
   const bool animated = features.has_animation != 0;
   auto image = std::make_shared<Image>();
+  image->format = "webp";
   image->name = name;
   image->width = features.width;
   image->height = features.height;

@@ -91,6 +91,7 @@ struct Document {
   // Accessors that primitives name but that cannot be read.
   std::map<const Primitive*, std::vector<int>> unreadable;
   std::vector<std::string> variants, extensionsIgnored;
+  FilePartCounts parts{};
   Report report;
   Usage usage;
   ContentHash hash;
@@ -98,6 +99,7 @@ struct Document {
   uint64_t sourceBytes = 0;
 
   const Accessor& accessor(int index) const { return model.accessors[static_cast<size_t>(index)]; }
+  void count(FilePart part, uint64_t number = 1) { parts[static_cast<size_t>(part)] += number; }
   // Marks an accessor as used, with its views and their buffers.
   void useAccessor(int index);
   void useView(int index);

@@ -177,6 +177,7 @@ void resolveViews(Document& document) {
   });
   for (Job& job : jobs) {
     if (job.decoded) {
+      document.count(FilePart::MeshoptViews);
       job.view->data = job.view->decoded;
       if (job.view->stride == 0 && job.packed.mode == Mode::Attributes) job.view->stride = job.packed.stride;
       continue;

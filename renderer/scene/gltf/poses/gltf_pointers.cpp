@@ -188,6 +188,7 @@ void animateProperties(Document& document) {
     const std::optional<std::vector<double>>& value = values[i];
     if (!value) continue;
     any = true;
+    document.count(FilePart::AnimatedProperties);
     if (property.visibleNode >= 0) {
       setVisible(document.model.nodes[static_cast<size_t>(property.visibleNode)], (*value)[0] != 0);
       continue;
