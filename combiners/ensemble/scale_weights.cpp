@@ -5,6 +5,7 @@
 
 #include "combiners/ensemble/scales/block_errors.h"
 #include "combiners/ensemble/scales/error_scale.h"
+#include "combiners/ensemble/scales/pooled_noise.h"
 #include "combiners/ensemble/simplex_solver.h"
 #include "combiners/ensemble/weight_bilateral.h"
 #include "combiners/pixels/box_mean.h"
@@ -17,7 +18,7 @@ namespace braid {
 namespace {
 
 constexpr int kWindows[] = {4, 1};     // radii in blocks
-constexpr double kNoise = 2;           // by which N counts: fireflies that fell into neither half are not in it
+constexpr double kPooled = 8;          // by which the noise of x counts: the errors of heavy tails are far from normal
 constexpr double kImprovement = 1e-5;  // weights to 1e-9 of the error change nothing
 constexpr double kCommonNoise = 0.98;  // of the smallest entry of M: mostly the noise of x, which moves no minimum
 
@@ -27,17 +28,28 @@ double advantage(const PairPlanes& m, size_t i, size_t j, size_t block) {
   return static_cast<double>(m[pairIndex(i, i)][block]) - static_cast<double>(m[pairIndex(j, j)][block]);
 }
 
+// d²: how far two candidates are apart.
+double distanceOf(const PairPlanes& m, size_t i, size_t j, size_t block) {
+  return static_cast<double>(m[pairIndex(i, i)][block]) + static_cast<double>(m[pairIndex(j, j)][block]) -
+         2 * static_cast<double>(m[pairIndex(i, j)][block]);
+}
+
 // The share s of every window in M.
-Plane<float> windowShares(const PairPlanes (&window)[2], const PairPlanes& m, size_t candidates, int radius) {
+Plane<float> windowShares(const PairPlanes (&window)[2], const PairPlanes& m, const Plane<float>& pooled,
+                          size_t candidates, int radius) {
+  const double side = (2 * radius + 1) * kErrorBlock, perPixel = kPooled * 2 / (side * side);
   Plane<float> noise(m[0].width, m[0].height, kUnfilled), distance(m[0].width, m[0].height, kUnfilled);
   parallelChunks(noise.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t k = begin; k < end; ++k) {
+      const double pairings = pooled.empty() ? 2 : 1;  // without the other measure this one has to count for both
+      const double ofX = pooled.empty() ? 0 : perPixel * static_cast<double>(pooled[k]);
       double n = 0, s = 0;
       for (size_t i = 0; i < candidates; ++i)
         for (size_t j = 0; j < i; ++j) {
           const double a = advantage(window[0], i, j, k), b = advantage(window[1], i, j, k);
           const double between = 0.5 * (a - b), beyond = 0.5 * (a + b) - advantage(m, i, j, k);
-          n += between * between;
+          const double apart = 0.5 * (distanceOf(window[0], i, j, k) + distanceOf(window[1], i, j, k));
+          n += std::max(pairings * between * between, ofX * apart);
           s += beyond * beyond;
         }
       noise[k] = finiteFloat(n);
@@ -48,17 +60,17 @@ Plane<float> windowShares(const PairPlanes (&window)[2], const PairPlanes& m, si
   distance = boxMean<float>(distance, radius + 1);
   for (size_t k = 0; k < noise.size(); ++k) {
     const double n = static_cast<double>(noise[k]), s = static_cast<double>(distance[k]);
-    distance[k] = s > 0 ? static_cast<float>(std::max(0.0, 1 - kNoise * n / s)) : 0.0f;
+    distance[k] = s > 0 ? static_cast<float>(std::max(0.0, 1 - n / s)) : 0.0f;
   }
   return distance;
 }
 
 // Draws M to the windows of one size.
-void drawTo(const PairPlanes (&blocks)[2], size_t candidates, int radius, PairPlanes& m) {
+void drawTo(const PairPlanes (&blocks)[2], const Plane<float>& pooled, size_t candidates, int radius, PairPlanes& m) {
   PairPlanes window[2];
   for (size_t h = 0; h < 2; ++h)
     for (const Plane<float>& plane : blocks[h]) window[h].push_back(boxMean<float>(plane, radius));
-  const Plane<float> shares = windowShares(window, m, candidates, radius);
+  const Plane<float> shares = windowShares(window, m, pooled, candidates, radius);
   parallelFor(m.size(), [&](size_t p) {
     for (size_t k = 0; k < shares.size(); ++k) {
       const double own = 0.5 * (static_cast<double>(window[0][p][k]) + static_cast<double>(window[1][p][k]));
@@ -108,7 +120,8 @@ WeightMaps scaleWeights(const Estimate& x, const std::vector<const Estimate*>& c
   for (size_t p = 0; p < blocks[0].size(); ++p)
     m.emplace_back(blocks[0][p].width, blocks[0][p].height,
                    finiteFloat(0.5 * (planeMean(blocks[0][p]) + planeMean(blocks[1][p]))));
-  for (const int radius : kWindows) drawTo(blocks, candidates.size(), radius, m);
+  const Plane<float> pooled = pooledNoise(x, roots);
+  for (const int radius : kWindows) drawTo(blocks, pooled, candidates.size(), radius, m);
   WeightMaps out = uniformWeights(candidates.size(), 1, x.mean.width(), x.mean.height());
   parallelRows(m[0].height, [&](int row) { solveRow(m, row, out); });
   return filteredWeights(out, weightedEstimate(out, candidates), features, kErrorBlock);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Weights from errors at several scales: their matrices against plain loops, and who decides at how many samples.
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -28,6 +29,25 @@ Estimate noisy(int width, int height, Value value, double deviation, uint32_t se
         for (Rgb<float>& half : e.half) half[c].at(x, y) = static_cast<float>(value(x, y) + deviation * normal(random));
         e.mean[c].at(x, y) = 0.5f * (e.half[0][c].at(x, y) + e.half[1][c].at(x, y));
       }
+  return e;
+}
+
+// An estimate of 1 by samples of which few are bright, and its variance, which is 0 where none is.
+Estimate withFireflies(int width, int height, double share, uint32_t seed) {
+  std::mt19937 random(seed);
+  std::bernoulli_distribution bright(share);
+  Estimate e;
+  e.passes = 4;
+  e.mean = e.half[0] = e.half[1] = e.variance = Rgb<float>(width, height);
+  for (size_t i = 0; i < e.mean.size(); ++i) {
+    const float half[2] = {bright(random) ? static_cast<float>(1 / share) : 0.0f,
+                           bright(random) ? static_cast<float>(1 / share) : 0.0f};
+    for (size_t c = 0; c < 3; ++c) {
+      for (size_t h = 0; h < 2; ++h) e.half[h][c][i] = half[h];
+      e.mean[c][i] = 0.5f * (half[0] + half[1]);
+      e.variance[c][i] = 0.25f * (half[0] - half[1]) * (half[0] - half[1]);
+    }
+  }
   return e;
 }
 
@@ -110,6 +130,27 @@ TEST_CASE("From few samples the better of two images is found by the whole image
     CAPTURE(seed);
     CHECK(mean > 0.7);
   }
+}
+
+TEST_CASE("What few fireflies say of windows by chance makes no islands of the noisier image") {
+  const int width = 320, height = 192, seeds = 4;
+  const Estimate good = noisy(width, height, flat, 0.01, 2), bad = noisy(width, height, flat, 0.15, 3);
+  const auto islands = [&](const Estimate& x) {
+    const WeightMaps w = scaleWeights(x, {&good, &bad}, nullptr);
+    const auto& ofBad = w.of(1, 0).data;
+    return static_cast<double>(std::count_if(ofBad.begin(), ofBad.end(), [](float v) { return v > 0.4f; })) /
+           static_cast<double>(ofBad.size() * seeds);
+  };
+  double with = 0, without = 0;
+  for (uint32_t seed = 10; seed < 10 + seeds; ++seed) {
+    Estimate x = withFireflies(width, height, 0.02, seed);
+    with += islands(x);
+    x.variance = {};
+    without += islands(x);
+  }
+  // A fiftieth of the image where only the halves tell of noise.
+  CHECK(without > 0.01);
+  CHECK(with < 0.001);
 }
 
 TEST_CASE("Extreme images: finite weights on the simplex") {
