@@ -27,7 +27,7 @@ set_source_files_properties(tests/main.cpp tests/support/counted_memory.cpp PROP
 # What also runs under sanitizers, where long statistics would take too long; nothing else is built there. What reads
 # strangers' files and renders them shortly is a program of its own, that needs neither combiners nor command line.
 set(loading "(gltf|fuzz|texture|film|exr|state|registry|scene)")
-set(sanitized "(metrics|cli|pw|combiner_stability|cross_half_bias|photon_map_shrinkage|lone_fireflies|own_halves|refilter|rendering_revision|networks|network_file|kpn|tza)")
+set(sanitized "(metrics|cli|pw|combiner_stability|cross_half_bias|photon_map_shrinkage|lone_fireflies|own_halves|refilter|rendering_revision|networks|network_file|window_cells|kpn|tza)")
 file(GLOB_RECURSE test_sources CONFIGURE_DEPENDS tests/test_*.cpp)
 set(loading_sources ${test_sources})
 list(FILTER loading_sources INCLUDE REGEX "/test_${loading}[^/]*\\.cpp$")

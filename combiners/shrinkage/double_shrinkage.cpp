@@ -16,6 +16,7 @@
 #include "combiners/shrinkage/debias.h"
 #include "combiners/statistics/fireflies.h"
 #include "combiners/statistics/half_statistics.h"
+#include "combiners/pixels/channel_mean.h"
 #include "combiners/pixels/finite_float.h"
 #include "combiners/shrinkage/double_shrinkage_prior.h"
 #include "combiners/pipeline/registry.h"
@@ -100,29 +101,6 @@ Plane<float> errorOfMean(const Plane<float>& ofX, const Plane<float>& ofY, const
   return out;
 }
 
-constexpr float kFireflyVariance = 1.0f / 25;  // of the variance of a firefly that was replaced
-
-// The mean and the halves of x without its lone fireflies, whose variance is lowered.
-Estimate withoutFireflies(const Estimate& x, const Estimate& y, Rgb<float>& variance) {
-  const Plane<float> gate = fireflyGate(variance, kGateRadius);
-  Estimate out;
-  out.name = x.name;
-  out.passes = x.passes;
-  out.mean = x.mean;
-  for (int h = 0; h < 2; ++h) out.half[h] = x.half[h];
-  parallelChunks(gate.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      if (!isLoneFirefly(gate, x.mean, y.mean, i)) continue;
-      for (size_t c = 0; c < 3; ++c) {
-        out.mean[c][i] = y.mean[c][i];
-        for (int h = 0; h < 2; ++h) out.half[h][c][i] = y.half[h][c][i];
-        variance[c][i] *= kFireflyVariance;
-      }
-    }
-  });
-  return out;
-}
-
 // What is read of a photon map: corrected by its own bias estimate, and without its fireflies, which a prior that is
 // fitted to them would spread.
 Estimate prepared(const MethodInputs& in) {
@@ -141,19 +119,12 @@ class DoubleShrinkageMethod : public Method {
     return "Precision-weighted mean of the unbiased image, the biased one, and a smooth prior fitted to both";
   }
   MethodKind kind() const override { return MethodKind::Combiner; }
-  Needs needs() const override {
-    Needs needs;
-    needs.biased = true;
-    needs.helpful.features = needs.helpful.featureNoise = true;
-    needs.helpful.quarters = true;
-    needs.passes = 4;
-    return needs;
-  }
-  MethodMemory memory(const MemoryCase& of) const override { return {284 + (of.photonMap ? 108 : 0), 72}; }
+  Needs needs() const override { return doubleShrinkageNeeds(); }
+  MethodMemory memory(const MemoryCase& of) const override { return doubleShrinkageMemory(of); }
   std::vector<OptionInfo> options() const override {
     return {kPrior, kStage, kStride, kOwnHalves, kGate, kDebias, kFireflies, kMeasured, kFused, kChosen};
   }
-  MethodResult run(const MethodInputs& in) const override;
+  MethodResult run(const MethodInputs& in) const override { return runDoubleShrinkage(in, nullptr); }
 };
 
 // kappa_1, kappa_2 and the variance of the posterior of every pixel; without a prior its error is infinite.
@@ -208,8 +179,8 @@ Plane<float> estimatedError(const Estimate& out, const Estimate& first, const Pl
 // One run: what its steps leave to each other.
 class DoubleShrinkageRun {
  public:
-  explicit DoubleShrinkageRun(const MethodInputs& given)
-      : given_(given), in_(given), variance_(meanVariance(*given.unbiased)) {}
+  DoubleShrinkageRun(const MethodInputs& given, const ErrorModel* model)
+      : given_(given), model_(model), in_(given), variance_(meanVariance(*given.unbiased)) {}
   MethodResult run();
 
  private:
@@ -218,8 +189,10 @@ class DoubleShrinkageRun {
   // The second shrinkage, of the image of the first.
   void shrinkTowardsPrior(Maps& maps);
   Estimate priorOf(const PriorInput& of, const Estimate& first);
-  void addPlane(const char* name, Plane<float> plane) {
-    result_.aovs.push_back({std::string(name) + ".double-shrinkage", std::move(plane)});
+  // What the model says of all errors; the maps and the first shrinkage follow from that.
+  void learn(const Rgb<float>& prior, Plane<float>& errorP, Maps& maps, Estimate& first);
+  void addPlane(const std::string& name, Plane<float> plane) {
+    result_.aovs.push_back({name + (model_ ? ".double-shrinkage-neural" : ".double-shrinkage"), std::move(plane)});
   }
 
   bool isOn(const OptionInfo& option) const { return in_.options.number(option) != 0; }
@@ -227,13 +200,17 @@ class DoubleShrinkageRun {
   const Estimate& y() const { return *in_.biased; }
   bool halves() const { return hasHalves(x()) && hasHalves(y()); }
   // Without halves nothing shows how good a prior is.
-  bool hasPrior() const { return halves() && in_.options.number(kStage) >= 2 && in_.options.number(kPrior) < 2; }
+  bool hasPrior() const {
+    return halves() && (model_ || (in_.options.number(kStage) >= 2 && in_.options.number(kPrior) < 2));
+  }
 
   const MethodInputs& given_;
+  const ErrorModel* model_;
   MethodInputs in_;      // what is combined
   Rgb<float> variance_;  // of x
   Estimate clean_, cleanMap_;
   Plane<float> errorU_, errorB_, squaredBias_;  // the last one of a photon map only
+  ShrinkageErrors samples_;                     // with a model: as pixels say them
   MethodResult result_;
 };
 
@@ -243,7 +220,7 @@ void DoubleShrinkageRun::cleanInputs() {
     in_.biased = &cleanMap_;
   }
   if (!isOn(kGate) || !halves()) return;
-  clean_ = withoutFireflies(x(), y(), variance_);
+  clean_ = withoutLoneFireflies(x(), y(), variance_);
   in_.unbiased = &clean_;
 }
 
@@ -251,15 +228,17 @@ void DoubleShrinkageRun::measureErrors() {
   const bool measured = isOn(kMeasured);
   errorU_ = unbiasedError(x(), variance_);
   errorB_ = biasedError(y(), x(), variance_, in_.features, measured);
+  if (model_ && hasPrior()) samples_ = {channelMean(variance_), biasedErrorSamples(y(), x(), variance_), {}};
   if (y().bias.empty()) return;
   if (measured) countMissingLight(errorU_, x(), variance_, y(), errorB_);
+  if (measured && !samples_.unbiased.empty()) countMissingLight(samples_.unbiased, x(), variance_, y(), errorB_);
   squaredBias_ = squaredBiasSamples(y());
   cleanMap_.bias = cleanMap_.biasVariance = Rgb<float>();  // read no more
 }
 
 Estimate DoubleShrinkageRun::priorOf(const PriorInput& of, const Estimate& first) {
   PriorChoice choice;
-  choice.optimisedBias = in_.options.number(kPrior) == 1;
+  choice.optimisedBias = !model_ && in_.options.number(kPrior) == 1;
   choice.ownHalves = isOn(kOwnHalves);
   choice.stride = static_cast<int>(std::clamp(in_.options.number(kStride), 1.0, 64.0));
   RegressionReport report;
@@ -268,9 +247,20 @@ Estimate DoubleShrinkageRun::priorOf(const PriorInput& of, const Estimate& first
   return prior;
 }
 
+void DoubleShrinkageRun::learn(const Rgb<float>& prior, Plane<float>& errorP, Maps& maps, Estimate& first) {
+  ShrinkageErrors filtered{std::move(errorU_), std::move(errorB_), std::move(errorP)};
+  ShrinkageErrors said = (*model_)({x().mean, y().mean, prior, samples_, filtered});
+  samples_ = {};
+  errorU_ = std::move(said.unbiased);
+  errorB_ = std::move(said.biased);
+  errorP = std::move(said.prior);
+  maps = Maps(errorU_, errorB_, errorP);
+  first = meanOf(x(), variance_, y(), maps.toBiased);
+}
+
 void DoubleShrinkageRun::shrinkTowardsPrior(Maps& maps) {
   Estimate& out = result_.image;
-  const Estimate first = std::move(out);
+  Estimate first = std::move(out);
   PriorInput of = {&x(), &variance_, errorU_};
   Estimate trusted;
   if (isOn(kFused) && !squaredBias_.empty()) {
@@ -280,13 +270,18 @@ void DoubleShrinkageRun::shrinkTowardsPrior(Maps& maps) {
   }
   Estimate prior = priorOf(of, first);
   Plane<float> errorP = priorError(prior.mean, prior.half, *of.x, *of.variance, of.error);
-  maps = Maps(errorU_, errorB_, errorP);
+  if (model_)
+    learn(prior.mean, errorP, maps, first);
+  else
+    maps = Maps(errorU_, errorB_, errorP);
   out = towards(prior, first, maps.toPrior);
   if (isOn(kChosen)) chooseBetween(out, first, in_.features);
   if (!squaredBias_.empty()) result_.error = estimatedError(out, first, maps.toBiased, squaredBias_);
-  const char* const channels[3] = {"R", "G", "B"};
-  for (size_t c = 0; c < 3; ++c)
-    result_.aovs.push_back({std::string("prior.double-shrinkage.") + channels[c], std::move(prior.mean[c])});
+  const char* const channels[3] = {".R", ".G", ".B"};
+  for (size_t c = 0; c < 3; ++c) {
+    addPlane("prior", std::move(prior.mean[c]));
+    result_.aovs.back().name += channels[c];
+  }
   addPlane("eta2", std::move(errorP));
 }
 
@@ -309,9 +304,26 @@ MethodResult DoubleShrinkageRun::run() {
   return std::move(result_);
 }
 
-MethodResult DoubleShrinkageMethod::run(const MethodInputs& in) const { return DoubleShrinkageRun(in).run(); }
-
 }  // namespace
+
+MethodResult runDoubleShrinkage(const MethodInputs& in, const ErrorModel* model) {
+  return DoubleShrinkageRun(in, model).run();
+}
+
+Needs doubleShrinkageNeeds() {
+  Needs needs;
+  needs.biased = true;
+  needs.helpful.features = needs.helpful.featureNoise = true;
+  needs.helpful.quarters = true;
+  needs.passes = 4;
+  return needs;
+}
+
+MethodMemory doubleShrinkageMemory(const MemoryCase& of) { return {284 + (of.photonMap ? 108 : 0), 72}; }
+
+std::vector<OptionInfo> commonDoubleShrinkageOptions() {
+  return {kStride, kOwnHalves, kGate, kDebias, kFireflies, kMeasured, kFused, kChosen};
+}
 
 DoubleShrinkage doubleShrinkage(double unbiasedError, double biasedError, double priorError) {
   DoubleShrinkage s;

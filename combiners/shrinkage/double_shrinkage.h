@@ -1,7 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The weights of the double shrinkage estimator (DSCombiner) from squared errors (combiners/README.md, Double
+// The weights of the double shrinkage estimator (DSCombiner) from squared errors, the method ("double-shrinkage"), and
+// what a network may say in the place of its filters ("double-shrinkage-neural"; combiners/README.md, Double
 // shrinkage).
 #pragma once
+
+#include <functional>
+#include <vector>
+
+#include "combiners/method.h"
 
 namespace braid {
 
@@ -16,5 +22,27 @@ struct DoubleShrinkage {
 
 // Squared errors >= 0; an infinite one takes its image out, a zero takes the others out.
 DoubleShrinkage doubleShrinkage(double unbiasedError, double biasedError, double priorError);
+
+// E_u, E_b and eta² of every pixel.
+struct ShrinkageErrors {
+  Plane<float> unbiased, biased, prior;
+};
+
+// What a network sees: the images, and the errors as pixels say them, without that of the prior.
+struct ErrorImages {
+  const Rgb<float>&unbiased, &biased, &prior;
+  const ShrinkageErrors& samples;
+  const ShrinkageErrors& filtered;  // what double-shrinkage makes of them
+};
+
+using ErrorModel = std::function<ShrinkageErrors(const ErrorImages&)>;
+
+// Without a model: double-shrinkage. With one, there is a radiance prior wherever there are halves.
+MethodResult runDoubleShrinkage(const MethodInputs& in, const ErrorModel* model);
+
+Needs doubleShrinkageNeeds();
+MethodMemory doubleShrinkageMemory(const MemoryCase& of);
+// Those that are read with a model as well.
+std::vector<OptionInfo> commonDoubleShrinkageOptions();
 
 }  // namespace braid

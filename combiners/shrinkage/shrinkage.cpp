@@ -21,6 +21,8 @@ constexpr double kShare = 0.5;  // of `least`: the most that another such pixel 
 constexpr double kLeastSum = 1e-5;        // released code
 constexpr double kRelativeLeast = 1e-12;  // of a squared difference, relative to x²: below it is rounding
 
+constexpr float kFireflyVariance = 1.0f / 25;  // of the variance of a firefly that was replaced
+
 template <class Body>
 void forAll(size_t count, const Body& body) {
   parallelChunks(count, kPixelChunk, [&](size_t begin, size_t end) {
@@ -101,8 +103,9 @@ struct Terms {
   Plane<float> squares, noise;
 };
 
-// The mean factor of every pixel of one channel; those of blocks are not below `least`, if any.
-Plane<float> factors(Terms terms, const JamesSteinSettings& s, const Plane<float>* least) {
+// The mean factor of every pixel of one channel; those of blocks are not below `least`, if any. `blocks` has the noise
+// of blocks where it is known, else it is empty.
+Plane<float> factors(Terms terms, const JamesSteinSettings& s, const Plane<float>& blocks, const Plane<float>* least) {
   if (s.global) {
     const auto n = static_cast<double>(terms.squares.size());
     const double numerator = s.constant * std::max(0.0, n - 2) / n * total(terms.noise);
@@ -110,7 +113,7 @@ Plane<float> factors(Terms terms, const JamesSteinSettings& s, const Plane<float
             finiteFloat(shrinkageFactor(numerator, total(terms.squares), s.positivePart))};
   }
   const double p = pixelsOfBlock(s);
-  Plane<float> noise = noiseOfBlocks(terms.noise, s);
+  Plane<float> noise = blocks.empty() ? noiseOfBlocks(terms.noise, s) : blocks;
   terms.noise = {};  // no more memory at once than is needed: the first touch of new memory takes longer than the loop
   Plane<float> factor = mirrorBoxMean<float>(terms.squares, s.radius);
   terms.squares = {};
@@ -246,6 +249,26 @@ bool isLoneFirefly(const Plane<float>& gate, const Rgb<float>& x, const Rgb<floa
   return sum <= pixels * least / sqr(kContradiction);
 }
 
+Estimate withoutLoneFireflies(const Estimate& x, const Estimate& y, Rgb<float>& variance) {
+  const Plane<float> gate = fireflyGate(variance, kGateRadius);
+  Estimate out;
+  out.name = x.name;
+  out.passes = x.passes;
+  out.mean = x.mean;
+  for (int h = 0; h < 2; ++h) out.half[h] = x.half[h];
+  parallelChunks(gate.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      if (!isLoneFirefly(gate, x.mean, y.mean, i)) continue;
+      for (size_t c = 0; c < 3; ++c) {
+        out.mean[c][i] = y.mean[c][i];
+        for (int h = 0; h < 2; ++h) out.half[h][c][i] = y.half[h][c][i];
+        variance[c][i] *= kFireflyVariance;
+      }
+    }
+  });
+  return out;
+}
+
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rgb<float>& y,
                        const JamesSteinSettings& settings) {
   return jamesStein(x, variance, noiseScale(variance, settings), y, settings);
@@ -253,13 +276,13 @@ ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const Rg
 
 ShrunkImage jamesStein(const Rgb<float>& x, const Rgb<float>& variance, const NoiseScale& scale, const Rgb<float>& y,
                        const JamesSteinSettings& settings, const LeastFactors* least) {
-  BRAID_ASSERT(!least || !settings.global);
+  BRAID_ASSERT((!least && scale.blocks[0].empty()) || !settings.global);
   ShrunkImage out;
   out.image = Rgb<float>(x.width(), x.height(), kUnfilled);
   const size_t together = settings.shared ? 3 : 1;
   for (size_t first = 0; first < 3; first += together) {
-    Plane<float> factor =
-        factors(termsOf(x, variance, scale, y, first, together), settings, least ? &least->blocks[first] : nullptr);
+    Plane<float> factor = factors(termsOf(x, variance, scale, y, first, together), settings, scale.blocks[first],
+                                  least ? &least->blocks[first] : nullptr);
     const Plane<float>* const ofFireflies =
         least && !least->fireflies[first].empty() ? &least->fireflies[first] : nullptr;
     parallelChunks(x.size(), kPixelChunk, [&](size_t begin, size_t end) {

@@ -12,6 +12,7 @@
 #include <array>
 
 #include "renderer/core/plane.h"
+#include "renderer/film/estimates.h"
 
 namespace braid {
 
@@ -50,6 +51,8 @@ Plane<float> usualVariance(const Plane<float>& variance);
 struct NoiseScale {
   std::array<Plane<float>, 3> inverseUnit;  // one over what a squared difference is measured in; empty: 1
   Plane<float> gate;  // of lone fireflies: a mean squared difference below this is theirs, 0 elsewhere; or empty
+  // sigma_c² of every block in the place of what the filter makes of the variances; or empty. Not with a unit.
+  std::array<Plane<float>, 3> blocks;
 };
 NoiseScale noiseScale(const Rgb<float>& variance, const JamesSteinSettings& settings);
 
@@ -65,6 +68,9 @@ Plane<float> fireflyGate(const Rgb<float>& variance, int radius);
 // may be fireflies themselves say half of what contradicts y at most. A glossy reflection's pixels stand out by their
 // variances, too, and y may be far off in all of them. `gate` is that of the noise of x, or empty.
 bool isLoneFirefly(const Plane<float>& gate, const Rgb<float>& x, const Rgb<float>& y, size_t i);
+
+// The mean and the halves of x without its lone fireflies, whose variance is lowered.
+Estimate withoutLoneFireflies(const Estimate& x, const Estimate& y, Rgb<float>& variance);
 
 struct ShrunkImage {
   Rgb<float> image;

@@ -93,6 +93,13 @@ Plane<float> squaredBiasSamples(const Estimate& photonMap) {
   });
 }
 
+Plane<float> biasedErrorSamples(const Estimate& y, const Estimate& x, const Rgb<float>& varianceOfX) {
+  Plane<float> out = y.bias.empty() ? squaredErrorSamples(y.half, x, varianceOfX) : squaredBiasSamples(y);
+  const Plane<float> variance = y.bias.empty() ? Plane<float>() : channelMean(meanVariance(y));
+  for (size_t i = 0; i < out.size(); ++i) out[i] = std::max(0.0f, out[i] + (variance.empty() ? 0.0f : variance[i]));
+  return out;
+}
+
 PhotonMapError photonMapError(const Estimate& photonMap, const Features* features, const Estimate* unbiased) {
   const Rgb<float> noise = meanVariance(photonMap);
   const Plane<float> spread = channelMean(noise);

@@ -44,6 +44,10 @@ Plane<float> totalError(const Estimate& photonMap, const PhotonMapError& error);
 Plane<float> biasedError(const Estimate& biased, const Estimate& unbiased, const Rgb<float>& variance,
                          const Features* features, bool measured = false);
 
+// E_b as the pixels say it: of an image that estimates its own bias that variance and that square, else the error
+// across halves; averaged over channels, and not below 0.
+Plane<float> biasedErrorSamples(const Estimate& biased, const Estimate& unbiased, const Rgb<float>& variance);
+
 // eta²: the squared error of the prior, measured across halves as in half_statistics.h against those of x (the unbiased
 // image in the paper), and averaged over 13 x 13 pixels in units of the brightness, sqrt(level² + 0.01): as it is,
 // bright pixels would keep the dark ones beside them noisy (combiners/EXPERIMENTS.md, Priors beside photon maps).

@@ -6,7 +6,7 @@
 
 #include <doctest/doctest.h>
 
-#include "combiners/denoise/kpn/kpn_network.h"
+#include "combiners/learned/network_place.h"
 #include "combiners/shrinkage/fused_estimate.h"
 #include "combiners/pipeline/external_method.h"
 #include "combiners/pipeline/method_names.h"
@@ -164,10 +164,10 @@ TEST_CASE("auto does without a helper that fails") {
   const Folder folder;
   const std::string broken = (folder.path / "broken.network").string();
   std::ofstream(broken) << "no network";
-  nameKpnNetwork(broken);
+  nameNetwork("kpn", broken);
   const Estimates e = kept(noisyCase(4), {"pt"});
   const PipelineResult result = runPipeline(e, {"auto"}, {});
-  nameKpnNetwork("");
+  nameNetwork("kpn", "");
   REQUIRE(result.find("auto")->ran());
   CHECK(result.find("auto")->step.bases.empty());
   if (const PipelineOutput* kpn = result.find("kpn")) CHECK_FALSE(kpn->ran());

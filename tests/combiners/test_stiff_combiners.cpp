@@ -95,11 +95,11 @@ Hull meansOf(const std::vector<const Estimate*>& estimates) {
   return hull;
 }
 
-Rgb<float> priorOf(const MethodResult& r) {
+Rgb<float> priorOf(const std::string& name, const MethodResult& r) {
   Rgb<float> prior(r.image.mean.width(), r.image.mean.height());
   for (const NamedPlane& p : r.aovs)
     for (size_t c = 0; c < 3; ++c)
-      if (p.name == std::string("prior.double-shrinkage.") + "RGB"[c]) prior[c] = p.plane;
+      if (p.name == "prior." + name + "." + "RGB"[c]) prior[c] = p.plane;
   return prior;
 }
 
@@ -127,15 +127,16 @@ std::string beyondDifferences(const Rgb<float>& out, const Rgb<float>& y, const 
 //   average, ensemble*, one-hot-*      weights of the bases, not negative, of sum 1
 //   inverse-variance, easy, curves,
 //   ideal                              a share in [0, 1] of X and of Y
-//   js without its regression          Y + rho (X - Y), rho in [0, 1]; then not below 0
-//   double-shrinkage                   twice a share in [0, 1]: of X, Y, less its told bias or not, and
+//   js, -neural without regression     Y + rho (X - Y), rho in [0, 1]; then not below 0
+//   double-shrinkage, -neural          twice a share in [0, 1]: of X, Y, less its told bias or not, and
 //                                      the prior (an output); not below 0
 //   box, nlm, pw, pw-wide, rdfc        weighted means of pixels of X (rdfc: of its halves)
 //   uncorrelated*                      a weighted sum of differences
 // No range: nfor, pw1, js with its regression and auto, which holds pw1, extrapolate by slopes.
 std::optional<std::string> beyondRange(const std::string& name, const Method& m, const StiffInputs& s) {
   MethodInputs in = s.inputs(m, !startsWith(name, "pw"));
-  if (name == "js") in.options.set("js-regression", 0);
+  if (startsWith(name, "js")) in.options.set("js-regression", 0);
+  if (name == "double-shrinkage-neural") in.options.set("double-shrinkage-remove-fireflies", 0);  // else of neighbours
   const Estimate &x = s.x(), &y = s.biased(m);
   if (name == "nfor" || name == "pw1" || name == "auto") return {};
   const MethodResult r = m.run(in);
@@ -144,9 +145,9 @@ std::optional<std::string> beyondRange(const std::string& name, const Method& m,
     return beyondHull(out, meansOf(in.bases));
   if (name == "inverse-variance" || name == "easy" || name == "curves" || name == "ideal")
     return beyondHull(out, {&x.mean, &y.mean});
-  if (name == "js") return beyondHull(out, {&x.mean, &y.mean}, true);
-  if (name == "double-shrinkage") {
-    const Rgb<float> prior = priorOf(r);
+  if (startsWith(name, "js")) return beyondHull(out, {&x.mean, &y.mean}, true);
+  if (startsWith(name, "double-shrinkage")) {
+    const Rgb<float> prior = priorOf(name, r);
     const Estimate less = debiased(y);
     return beyondHull(out, {&x.mean, &y.mean, &less.mean, &prior}, true);
   }

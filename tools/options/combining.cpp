@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "braid/plan_combining.h"
-#include "combiners/denoise/kpn/kpn_network.h"
+#include "combiners/learned/network_place.h"
 #include "combiners/denoise/oidn/oidn_networks.h"
 #include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/denoise_cutoff.h"
@@ -89,11 +89,14 @@ void addCombineOptions(CLI::App& command, CombineChoice& c) {
                                         "(default: BRAID_OIDN_WEIGHTS, or where tools/setup oidn puts them)")
       ->type_name("FOLDER")
       ->group(kMethodOptions);
-  command
-      .add_option_function<std::string>("--kpn-network", nameKpnNetwork,
-                                        "Network of kpn (default: BRAID_KPN_NETWORK, or the one that comes with braid)")
-      ->type_name("FILE")
-      ->group(kMethodOptions);
+  for (const char* method : {"kpn", "js-neural", "double-shrinkage-neural"})
+    command
+        .add_option_function<std::string>(
+            fmt::format("--{}-network", method), [method](const std::string& file) { nameNetwork(method, file); },
+            fmt::format("Network of {} (default: {}, or the one that comes with braid)", method,
+                        networkVariable(method)))
+        ->type_name("FILE")
+        ->group(kMethodOptions);
 }
 
 void combineByDefault(CombineChoice& choice) {

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kernel prediction: a network chooses how far each pixel averages its neighbours, at several scales.
-#include <filesystem>
-
 #include <fmt/format.h>
 
 #include "combiners/denoise/kpn/kpn_network.h"
+#include "combiners/learned/network_place.h"
 #include "combiners/pipeline/external_method.h"
 #include "combiners/pipeline/pipeline.h"
 #include "combiners/pipeline/registry.h"
@@ -40,17 +39,9 @@ class Kpn : public ExternalMethod {
     memory.eachThread = kTileBytes + kConvolutionScratch + kWeights;
     return memory;
   }
-  std::string skipReason() const override;
+  std::string skipReason() const override { return networkSkipReason(name()); }
   MethodResult run(const MethodInputs& in) const override;
 };
-
-std::string Kpn::skipReason() const {
-  const std::string file = findKpnNetwork();
-  std::error_code ignored;
-  if (!std::filesystem::exists(file, ignored)) return file + ": there is no such network";
-  std::string reason;
-  return convolutionsInstalled(reason) ? "" : reason;
-}
 
 MethodResult planesOf(const MethodInputs& in, KpnPlanes planes) {
   MethodResult result;
@@ -71,7 +62,7 @@ MethodResult Kpn::run(const MethodInputs& in) const {
   std::string reason;
   const ConvolutionLibrary* library = openConvolutions(reason);
   if (!library) throw Error(ExitCode::Usage, reason);
-  KpnNetwork network(findKpnNetwork(), *library);
+  KpnNetwork network(findNetwork(name()), *library);
   MethodResult result;
   result.image.mean = network.denoise(kpnPlanes(e.mean, scene, false), in.cancel);
   for (int h = 0; h < 2; ++h)

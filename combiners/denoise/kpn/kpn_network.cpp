@@ -2,24 +2,16 @@
 #include "combiners/denoise/kpn/kpn_network.h"
 
 #include <algorithm>
-#include <cstdlib>
-#include <filesystem>
 
 #include <fmt/format.h>
 
 #include "combiners/learned/network_file.h"
 #include "renderer/core/error.h"
-#include "renderer/core/module_path.h"
 #include "renderer/core/parallel.h"
 
 namespace braid {
 
 namespace {
-
-std::string& namedFile() {
-  static std::string file;
-  return file;
-}
 
 NetworkFile readKpn(const std::string& path) {
   NetworkFile file = readNetworkFile(path);
@@ -100,15 +92,5 @@ Rgb<float> KpnNetwork::denoise(KpnPlanes planes, const std::atomic<bool>* cancel
     });
   return out;
 }
-
-std::string findKpnNetwork() {
-  if (!namedFile().empty()) return namedFile();
-  if (const char* named = std::getenv("BRAID_KPN_NETWORK"); named && *named) return named;
-  std::error_code ignored;
-  const std::filesystem::path path = modulePath(BRAID_KPN_FILE, BRAID_MODULE_FOLDER);
-  return std::filesystem::exists(path, ignored) ? path.string() : BRAID_INSTALLED_MODULES "/" BRAID_KPN_FILE;
-}
-
-void nameKpnNetwork(const std::string& file) { namedFile() = file; }
 
 }  // namespace braid

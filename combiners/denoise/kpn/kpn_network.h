@@ -26,10 +26,4 @@ class KpnNetwork {
   TiledNetwork network_;
 };
 
-// The file that nameKpnNetwork() or else the environment variable BRAID_KPN_NETWORK says, else the one that lies with
-// the program.
-std::string findKpnNetwork();
-// For the rest of the process.
-void nameKpnNetwork(const std::string& file);
-
 }  // namespace braid

@@ -66,25 +66,29 @@ TEST_CASE("oidn takes no more memory than it states, and not much less where ima
   }
 }
 
-TEST_CASE("kpn takes no more memory than it states") {
-  const std::shared_ptr<const Method> method = findMethod("kpn");
-  if (!oneDnn() || !dynamic_cast<const ExternalMethod&>(*method).skipReason().empty()) return;
+TEST_CASE("Methods with networks of their own take no more memory than they state") {
   const Case c = makeCase(sized(1000, 600, 4));
-  const MethodInputs in = inputsOf(c);
-  const auto pixels = static_cast<double>(c.pt().mean.size());
-  MemoryCase of;
-  of.passes = 4;
-  const MethodMemory stated = method->memory(of);
-  const auto each = static_cast<double>(stated.eachThread);
-  for (const int threads : {1, 2}) {
-    const int64_t before = heapBytes();
-    resetHeapPeak();
-    MethodResult result;
-    withThreads(threads, [&] { result = method->run(in); });
-    const auto peak = static_cast<double>(heapPeak() - before);
-    INFO(method->name(), " on ", threads, " threads: ", (peak - each) / pixels, " bytes a pixel");
-    CHECK(peak < 1.1 * (pixels * stated.peak + threads * each));
-    CHECK(peak > 0.7 * (pixels * stated.peak + each));
+  for (const char* name : {"kpn", "js-neural", "double-shrinkage-neural"}) {
+    const std::shared_ptr<const Method> method = findMethod(name);
+    if (!oneDnn() || !dynamic_cast<const ExternalMethod&>(*method).skipReason().empty()) return;
+    const MethodInputs in = inputsOf(c);
+    const auto pixels = static_cast<double>(c.pt().mean.size());
+    MemoryCase of;
+    of.passes = 4;
+    of.photonMap = method->needs().biased;
+    const MethodMemory stated = method->memory(of);
+    const auto each = static_cast<double>(stated.eachThread);
+    for (const int threads : {1, 2}) {
+      const int64_t before = heapBytes();
+      resetHeapPeak();
+      MethodResult result;
+      withThreads(threads, [&] { result = method->run(in); });
+      const auto peak = static_cast<double>(heapPeak() - before);
+      INFO(method->name(), " on ", threads, " threads: ", (peak - each) / pixels, " bytes a pixel");
+      CHECK(peak < 1.1 * (pixels * stated.peak + threads * each));
+      CHECK(peak > 0.7 * (pixels * stated.peak + each));
+      CHECK(static_cast<double>(heapBytes() - before) == doctest::Approx(pixels * stated.kept).epsilon(0.1));
+    }
   }
 }
 
