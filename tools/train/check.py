@@ -5,7 +5,7 @@
     python3 tools/train/check.py BRAID
 
 A scene is made and rendered small; training lowers the error of its views; kernels.c gives what whole tensors give; and
-braid makes the same image with the exported network as torch does.
+braid makes the same images with the exported networks as torch does.
 """
 
 import os
@@ -78,10 +78,47 @@ def check_image(braid, folder, weights, exported):
             values.copy_(values.half().float())
         x, irradiance, variance, divisor = unpacked(torch.from_numpy(stored.astype(np.float32)))
         mine = (model(x, irradiance, variance) * divisor / exposure).numpy()[0]
-    theirs = data.rgb(data.read(out)[0], "combined.kpn")
-    difference = ((mine - theirs) ** 2).sum() / (mine**2).sum()
-    print(f"relative squared difference of braid and torch: {difference:.1e}")
-    assert difference < 1e-5, "braid's image is not that of torch"
+    compare(mine, out, "kpn")
+
+
+def compare(mine, out, method):
+    import data
+
+    channels, _ = data.read(out)
+    layer = next(n[: -len(".R")] for n in channels if n.startswith("combined." + method) and n.endswith(".R"))
+    difference = ((mine - data.rgb(channels, layer)) ** 2).sum() / (mine**2).sum()
+    print(f"relative squared difference of braid and torch, {method}: {difference:.1e}")
+    assert difference < 1e-5, f"braid's image by {method} is not that of torch"
+
+
+def check_shrinkage(braid, folder):
+    """Training of the two shrinkage methods, and braid's images of a view against torch's."""
+    import shrinkage_data
+    import torch
+    from shrinkage import METHODS
+
+    views, image = os.path.join(folder, "shrinkage"), os.path.join(folder, "both.exr")
+    python("shrinkage_data.py", "0", "1", views, "--braid", braid, "--size", "96x64", "--target", "16")
+    run(braid, "render", os.path.join(HERE, "../../scenes/cornell.glb"), "-o", image, "--integrator", "pt,sppm",
+        "--combine", "none", "--spp", "8", "--size", "96x64", "--aovs", "all", "--float", "-q")
+    for method, more in (("js-neural", []), ("double-shrinkage-neural", ["--double-shrinkage-chosen", "0"])):
+        weights, exported, out = (os.path.join(folder, method + end) for end in (".pt", ".network", ".exr"))
+        errors = []
+        for seconds in ("0", "12"):
+            python("shrinkage_train.py", method, views, "--validation", views, "-o", weights, "--seconds", seconds)
+            errors.append(sum(torch.load(weights)["record"]["validation"]["network"].values()))
+        assert errors[1] < errors[0], f"training of {method} did not help: {errors[0]} became {errors[1]}"
+        python("export.py", weights, exported)
+        run(braid, "combine", "--unbiased", image, "--method", method + "@sppm", f"--{method}-network", exported, *more,
+            "--float", "-q", "-o", out)
+        planes, exposure = shrinkage_data.planes_of(braid, image, method, "sppm", folder)
+        model = METHODS[method]()
+        model.load_state_dict(torch.load(weights)["model"])
+        with torch.no_grad():
+            for values in model.unet.parameters():
+                values.copy_(values.half().float())
+            mine = (model(*model.unpacked(torch.from_numpy(planes[None]))) / exposure).numpy()[0]
+        compare(mine, out, method)
 
 
 def main():
@@ -111,6 +148,7 @@ def main():
         assert sum(last.values()) < sum(first.values()), f"training did not help: {first} became {last}"
         python("export.py", weights, exported)
         check_image(braid, folder, weights, exported)
+        check_shrinkage(braid, folder)
 
 
 if __name__ == "__main__":

@@ -26,15 +26,14 @@ SAMPLES = ((1, 2), (4, 4, 8), (16, 32))
 PLANES = 18  # kKpnPlanes
 
 
-def read(path):
-    """The channels of an EXR by name."""
+def read(path, attribute="braid/kpn/kpn-exposure"):
+    """The channels of an EXR by name, and an attribute."""
     image = oiio.ImageInput.open(path)
     if image is None:
         raise SystemExit(f"{path}: {oiio.geterror()}")
     spec = image.spec()
     pixels = image.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
-    exposure = spec.getattribute("braid/kpn/kpn-exposure")
-    return {name: pixels[..., k] for k, name in enumerate(spec.channelnames)}, exposure
+    return {name: pixels[..., k] for k, name in enumerate(spec.channelnames)}, spec.getattribute(attribute)
 
 
 def rgb(channels, layer):

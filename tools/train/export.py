@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes trained weights as the file that kpn reads (combiners/learned/network_file.h).
+"""Writes trained weights as the file that their method reads (combiners/learned/network_file.h).
 
     python3 tools/train/export.py WEIGHTS.pt combiners/denoise/kpn/kpn.network
 """
@@ -14,6 +14,7 @@ import numpy as np
 import torch
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import shrinkage
 from network import KernelPrediction, PLANES
 
 
@@ -59,6 +60,10 @@ def write(path, model, training):
                       "gateSteepness": rounded(steepness[1]), "gateTolerance": rounded(tolerance[1])},
         "training": training,
     }
+    write_layers(path, description, modules)
+
+
+def write_layers(path, description, modules):
     text = json.dumps(description, separators=(",", ":")).encode()
     with open(path, "wb") as file:
         file.write(b"BRAIDNET" + struct.pack("<II", 1, len(text)) + text)
@@ -67,13 +72,24 @@ def write(path, model, training):
                 file.write(values.detach().numpy().astype("<f2").tobytes())
 
 
+def write_shrinkage(path, model, training):
+    described, modules = model.unet.layers()
+    inputs = model.PLANES * model.unet.pack**2
+    write_layers(path, {"inputs": inputs, "layers": described, "constants": {}, "training": training}, modules)
+
+
 def main():
     if len(sys.argv) != 3:
         raise SystemExit(__doc__)
     stored = torch.load(sys.argv[1])
-    model = KernelPrediction()
-    model.load_state_dict(stored["model"])
-    write(sys.argv[2], model, stored["record"])
+    if "method" in stored:
+        model = shrinkage.METHODS[stored["method"]](**stored["shape"])
+        model.load_state_dict(stored["model"])
+        write_shrinkage(sys.argv[2], model, stored["record"])
+    else:
+        model = KernelPrediction()
+        model.load_state_dict(stored["model"])
+        write(sys.argv[2], model, stored["record"])
     print(f"{sys.argv[2]}: {os.path.getsize(sys.argv[2])} bytes")
 
 
