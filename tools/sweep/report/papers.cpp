@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "tools/sweep/report/html.h"
+#include "combiners/learned/network_place.h"
 #include "tools/sweep/report/paper_cells.h"
 
 namespace braid {
@@ -16,7 +16,8 @@ namespace {
 // Names of the methods that the sections speak of.
 constexpr const char *kUncorrelated = "uncorrelated", *kUniform = "uncorrelated-uniform",
                      *kCross = "uncorrelated-cross";
-constexpr const char *kDouble = "bdpt+sppm/double-shrinkage@sppm", *kSingle = "bdpt+sppm/js@sppm";
+constexpr const char *kDouble = "bdpt+sppm/double-shrinkage@sppm", *kSingle = "bdpt+sppm/js@sppm",
+                     *kDoubleNeural = "bdpt+sppm/double-shrinkage-neural@sppm";
 constexpr const char *kEnsemble = "ensemble@nfor+rdfc", *kAverage = "average@nfor+rdfc",
                      *kOracle = "ensemble-oracle@nfor+rdfc";
 constexpr const char *kCurves = "curves@nfor", *kEasy = "easy@nfor", *kInverse = "inverse-variance@nfor",
@@ -32,12 +33,18 @@ const AutoCase kAuto{"pt/auto", {"pt"}}, kAutoPhotons{"pt+sppm/auto", {"pt", "sp
     kAutoCaustics{"bdpt+sppm/auto", {"bdpt", "sppm"}};
 const std::vector<std::string> kOneHots{"one-hot-sbf@nfor+rdfc", "one-hot-nfor@nfor+rdfc", "one-hot-post@nfor+rdfc"};
 const std::vector<std::string> kShrunk{"box", "nfor", "rdfc", "sppm"};
+const std::vector<std::string> kShrunkByNetwork{"box", "nfor", "sppm"};
 
 void add(const CellComparison& some, CellComparison& all) {
   all.cells.insert(all.cells.end(), some.cells.begin(), some.cells.end());
 }
 
-std::string shrunk(const std::string& biased) { return biased == "sppm" ? "pt/js@sppm" : "js@" + biased; }
+std::string shrunk(const std::string& biased, const std::string& method = "js") {
+  return (biased == "sppm" ? "pt/" : "") + method + "@" + biased;
+}
+std::string shrunkByNetwork(const std::string& biased) { return shrunk(biased, "js-neural"); }
+
+std::string inWords(const std::string& biased) { return biased == "box" ? "a 15x15 box filter" : biased; }
 
 class Comparison {
  public:
@@ -117,14 +124,21 @@ PaperClaim Comparison::figure(const std::string& text, const CellComparison& c) 
 }
 
 PaperSection Comparison::jamesStein() const {
-  PaperSection s{"Neural James-Stein combiner (Gu et al. 2022), with the regression in place of the network", {}};
+  PaperSection s{"Neural James-Stein combiner (Gu et al. 2022), without and with its network", {}};
   for (const std::string& biased : kShrunk)
-    s.claims.push_back(claim(fmt::format("Shrinking towards {} never has more error than path tracing (from 8 spp)",
-                                         biased == "box" ? "a 15x15 box filter" : biased),
-                             cells_.compare(shrunk(biased), {"pt"}, 8), 1.0, 1.0));
+    s.claims.push_back(
+        claim(fmt::format("Shrinking towards {} never has more error than path tracing (from 8 spp)", inWords(biased)),
+              cells_.compare(shrunk(biased), {"pt"}, 8), 1.0, 1.0));
   for (const char* biased : {"box", "nfor", "rdfc"})
     s.claims.push_back(onAverage(fmt::format("At the most samples it has less error than {} itself", biased),
                                  cells_.compare(shrunk(biased), {biased}, 8, {}, true), 1.0));
+  for (const std::string& biased : kShrunkByNetwork) {
+    const std::string text = "With the network, towards " + inWords(biased);
+    s.claims.push_back(claim(text + ": never more error than path tracing (from 8 spp)",
+                             cells_.compare(shrunkByNetwork(biased), {"pt"}, 8), 1.0, 1.0));
+    s.claims.push_back(onAverage(text + ": less error than without it",
+                                 cells_.compare(shrunkByNetwork(biased), {shrunk(biased)}, 8), 1.0));
+  }
   return s;
 }
 
@@ -177,6 +191,12 @@ PaperSection Comparison::doubleShrinkage() const {
       onAverage("Less error than single shrinkage", cells_.compare(kDouble, {kSingle}, 8, caustic()), 1.0));
   s.claims.push_back(onAverage("Less error than vertex connection and merging at equal time",
                                cells_.compareAtEqualTime(kDouble, "vcm", caustic()), 1.0));
+  s.claims.push_back(onAverage("With the network (double-shrinkage-neural): less error than both inputs",
+                               cells_.compare(kDoubleNeural, {"bdpt", "sppm"}, 8, caustic()), 1.0));
+  s.claims.push_back(claim("With the network: never more error than bdpt (from 8 spp)",
+                           cells_.compare(kDoubleNeural, {"bdpt"}, 8, caustic()), 1.0, 1.0));
+  s.claims.push_back(onAverage("With the network: less error than without it",
+                               cells_.compare(kDoubleNeural, {kDouble}, 8, caustic()), 1.0));
   return s;
 }
 
@@ -294,8 +314,6 @@ PaperSection Comparison::automatic() const {
   return s;
 }
 
-const char* verdict(const PaperClaim& c) { return !c.holds ? "–" : *c.holds ? "yes" : "no"; }
-
 }  // namespace
 
 std::vector<std::string> paperMethods() {
@@ -305,6 +323,9 @@ std::vector<std::string> paperMethods() {
                            kEasy, kInverse, kStopped, kIdeal, kAuto.method, kAutoPhotons.method, kAutoCaustics.method})
     methods.push_back(name);
   methods.insert(methods.end(), kOneHots.begin(), kOneHots.end());
+  if (networkSkipReason("js-neural").empty())
+    for (const std::string& biased : kShrunkByNetwork) methods.push_back(shrunkByNetwork(biased));
+  if (networkSkipReason("double-shrinkage-neural").empty()) methods.push_back(kDoubleNeural);
   return methods;
 }
 
@@ -319,30 +340,6 @@ std::vector<PaperSection> comparePapers(const SweepTable& table, const SweepSumm
                                         const std::map<std::string, std::string>& planned) {
   const Comparison c(table, summary, biases, planned);
   return {c.automatic(), c.jamesStein(), c.uncorrelated(), c.doubleShrinkage(), c.ensemble(), c.curves()};
-}
-
-std::string toMarkdown(const std::vector<PaperSection>& sections) {
-  std::string text;
-  for (const PaperSection& s : sections) {
-    text += fmt::format("### {}\n\n| claim | measured | holds |\n|---|---|---|\n", s.title);
-    for (const PaperClaim& c : s.claims) text += fmt::format("| {} | {} | {} |\n", c.claim, c.measured, verdict(c));
-    text += "\n";
-  }
-  return text;
-}
-
-std::string toHtml(const std::vector<PaperSection>& sections) {
-  std::string text;
-  for (const PaperSection& s : sections) {
-    text += fmt::format(
-        "<h3>{}</h3>\n<div class=wide><table class=claims>\n<tr><th>claim</th><th>measured</th><th>holds</th></tr>\n",
-        escaped(s.title));
-    for (const PaperClaim& c : s.claims)
-      text += fmt::format("<tr><td>{}</td><td>{}</td><td{}>{}</td></tr>\n", escaped(c.claim), escaped(c.measured),
-                          c.holds && *c.holds ? " class=best" : "", verdict(c));
-    text += "</table></div>\n";
-  }
-  return text;
 }
 
 }  // namespace braid

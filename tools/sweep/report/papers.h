@@ -28,7 +28,7 @@ std::vector<PaperSection> comparePapers(const SweepTable& table, const SweepSumm
                                         const std::vector<ReplicateBias>& biases,
                                         const std::map<std::string, std::string>& planned);
 
-// What a sweep has to measure for them.
+// What a sweep has to measure for them: with networks where they run here.
 std::vector<std::string> paperMethods();
 
 // Whether a sweep has methods that the sections are about.
