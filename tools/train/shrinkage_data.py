@@ -37,7 +37,8 @@ def planes_of(program, image, method, biased, folder):
     out = os.path.join(folder, "planes.exr")
     run(program, "combine", "--unbiased", image, "--method", f"{method}@{biased}", f"--{method}-planes", "1", "--weights",
         "--float", "-q", "-o", out)
-    channels, exposure = read(out, f"braid/{method}/{method}-exposure")
+    channels, exposure = read(out, f"braid/{method}@{biased}/{method}-exposure")
+    assert exposure, f"{out} does not say its exposure"
     kind = METHODS[method]
     stored = np.stack([channels[f"{method}.{k:02}.Y"] for k in range(kind.STORED)])
     stored[kind.LOGARITHMS] = np.log2(stored[kind.LOGARITHMS] + 2.0**-40)

@@ -108,7 +108,7 @@ def main():
     begun, step, losses, saved = time.time(), 0, [0.0], time.time()
     while True:
         seconds = time.time() - begun
-        if seconds >= o.seconds or time.time() - saved > 240:
+        if seconds >= o.seconds or time.time() - saved > 120:
             saved = time.time()
             record = {"steps": step, "seconds": round(seconds), "views": len(views.views),
                       "loss": round(sum(losses[-500:]) / len(losses[-500:]), 4)}
