@@ -136,7 +136,7 @@ bool PathKernel::turn(PathState& path, const Hit& hit, const Bsdf& bsdf, bool tw
   path.lastPosition = hit.position;
   path.lastNormal = receiverAt(hit, twoSided).normal;
   path.lastTwoSided = twoSided;
-  path.lastPdfW = sample.pdfW;
+  path.lastPdfW = sample.pdfW * static_cast<float>(path.directions);
   path.lightCouldNotBeSampled = sample.delta;
   if (path.bounces > 0 || bsdf.hasNonDelta()) ++path.bounces;
   return true;
@@ -154,7 +154,10 @@ void PathKernel::startAt(float time, int x, int y, uint64_t key) {
   // In place: assigned, they would take the way over the stack.
   std::construct_at(&sample_[i]);
   PathState& path = *std::construct_at(&path_[i]);
-  path.key = key;
+  path.key = path.pointsKey = key;
+  path.points = &sampler_;
+  path.sample = static_cast<int>(i);
+  isSplit_[i] = false;
   path.origin = ray.origin;
   path.direction = ray.direction;
   path.time = time;
@@ -165,6 +168,8 @@ void PathKernel::startAt(float time, int x, int y, uint64_t key) {
 
 void PathKernel::run() {
   activeCount_ = count_;
+  free_.clear();
+  for (int i = static_cast<int>(path_.size()); i-- > count_;) free_.push_back(i);
   for (int i = 0; i < count_; ++i) {
     active_[static_cast<size_t>(i)] = i;
     queueRay(i, path_[static_cast<size_t>(i)]);
@@ -177,6 +182,7 @@ void PathKernel::run() {
     shadeActive();
     traceShadows();
   }
+  addBranches();
 }
 
 void PathKernel::queueRay(int slot, PathState& path) {
@@ -205,7 +211,7 @@ void PathKernel::prepareShading() {
     if (!(query_[i].t < kInfinity)) continue;
     const PathState& path = path_[static_cast<size_t>(active_[i])];
     makeHit(scene_, query_[i], path.direction, hit_[i]);
-    block_[i] = sampler_.block(path.key, path.block());
+    block_[i] = path.points->block(path.pointsKey, path.block());
   }
   if (context_.lights.usesHierarchy()) pickLights();
 }
@@ -221,21 +227,27 @@ void PathKernel::shadeActive() {
   for (int a = 0; a < activeCount_; ++a) {
     const int p = active_[static_cast<size_t>(a)];
     const auto i = static_cast<size_t>(p), ray = static_cast<size_t>(a);
-    if (recorder_) recorder_->arrive(p, sample_[i].radiance);
+    PathSample& sample = sample_[static_cast<size_t>(path_[i].sample)];
+    if (recorder_) recorder_->arrive(p, sample.radiance);
     const bool met = query_[ray].t < kInfinity;
     if (walk_.any() && path_[i].walk.medium) {
       const Flight flight = finishFlight(path_[i], met ? &hit_[ray] : nullptr);
       if (flight == Flight::Scattered) goOn(p);
+      if (flight == Flight::Absorbed) free_.push_back(p);
       if (flight == Flight::Scattered || flight == Flight::Absorbed) continue;
     }
     if (!met) {
       ++missCount;
       if (observer_) observer_->onMiss();
-      addEnvironment(path_[i], sample_[i]);
-      continue;
+      addEnvironment(path_[i], sample);
+      free_.push_back(p);
+    } else if (shade(p, ray)) {
+      goOn(p);
+    } else {
+      free_.push_back(p);
     }
-    if (shade(p, ray)) goOn(p);
   }
+  for (; alive < kBatch && !waiting_.empty(); waiting_.pop_back()) goOn(waiting_.back());
   activeCount_ = alive;
 }
 
@@ -259,7 +271,7 @@ void PathKernel::traceShadows() {
 bool PathKernel::shade(int p, size_t ray) {
   const Hit& hit = hit_[ray];
   PathState& path = path_[static_cast<size_t>(p)];
-  PathSample& sample = sample_[static_cast<size_t>(p)];
+  PathSample& sample = sample_[static_cast<size_t>(path.sample)];
   if (observer_) observer_->onHit(hit);
   if (!path.walk.medium) path.throughput *= mediaTransmittance(scene_, path.media, hit.distance);
   const MaterialSummary& material = context_.summaryOf(hit);
@@ -285,8 +297,10 @@ bool PathKernel::shade(int p, size_t ray) {
   const bool asks = aids_.guide && path.segments <= kGuidedSegments && bsdf.hasNonDelta() && !path.walk.medium;
   const GuidedBsdf guided = asks ? GuidedBsdf(bsdf, *aids_.guide, hit) : GuidedBsdf(bsdf);
   if (guided.guided()) ++guidedCount;
+  const bool splits = aids_.splits > 1 && !path.isBranch && bsdf.hasNonDelta();
+  path.directions = splits ? aids_.splits : 1;
   if (bsdf.hasNonDelta()) sampleLights(p, ray, guided, firstNonSpecular && path.featuresDone);
-  return scatter(path, hit, guided, twoSided, block_[ray]);
+  return splits ? split(p, hit, guided, twoSided) : scatter(path, hit, guided, twoSided, block_[ray]);
 }
 
 }  // namespace braid

@@ -43,9 +43,17 @@ inline Receiver receiverAt(const Hit& hit, bool twoSided) {
 struct PathAids {
   const Guide* guide = nullptr;  // directions are sampled with it, too; null: by BSDFs alone
   int lightSamples = 1;          // at the first surface that is no mirror
+  int splits = 1;                // directions that a path goes on in from there
+  // Their points, in the order of the directions; none: hashed numbers.
+  std::span<const PassSampler> branches{};
 };
 
-// Sees the steps of a path, for replay.
+// The pass whose points branch k of n of a path of this pass has: branches of all passes fill a sequence of a bucket.
+inline uint64_t branchPass(uint64_t pass, uint64_t k, uint64_t n) {
+  return (pass / kSequenceBuckets * n + k) * kSequenceBuckets + pass % kSequenceBuckets;
+}
+
+// Sees the steps of a path, for replay; of a path that is split, those of its branches in turn.
 class PathObserver {
  public:
   virtual ~PathObserver() = default;
@@ -73,6 +81,8 @@ class PathKernel {
         filtered_(context.scene.accel().filtered()),
         walk_(context.scene, sampler),
         cameraMedia_(mediaOfCamera(context.scene, plan.camera)),
+        path_(kBatch),
+        sample_(kBatch),
         shadowRays_(context) {}
 
   // Starts a path through pixel (x, y) of the full frame with the random numbers of `key`. At most kBatch before a
@@ -83,7 +93,7 @@ class PathKernel {
   const PathSample& sample(int i) const { return sample_[static_cast<size_t>(i)]; }
   void clear() { count_ = 0; }
   void observe(PathObserver* observer) { observer_ = observer; }
-  void use(const PathAids& aids) { aids_ = aids; }
+  void use(const PathAids& aids);
   // Every vertex is told to the recorder.
   void teach(PathRecorder* recorder) { recorder_ = recorder; }
 
@@ -116,6 +126,8 @@ class PathKernel {
   bool connectLight(const PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided,
                     const LightSample& light, ShadowRay& shadow) const;
   void sampleLights(int p, size_t ray, const GuidedBsdf& bsdf, bool forFeatures);
+  bool split(int p, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided);
+  void addBranches();
   bool scatter(PathState& path, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided, const SampleBlock& block) const;
   bool turn(PathState& path, const Hit& hit, const Bsdf& bsdf, bool twoSided, const BsdfSample& sample) const;
   void recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsdf, PathSample& sample) const;
@@ -134,9 +146,12 @@ class PathKernel {
   MediaStack cameraMedia_;  // the solids that the camera is inside of
 
   int count_ = 0;
-  std::array<PathState, kBatch> path_{};
-  std::array<PathSample, kBatch> sample_{};
-  RayBatch rays_;  // in the order of active_, like their hits
+  // Those of the camera come first, then the branches that go on from a split.
+  std::vector<PathState> path_;
+  std::vector<PathSample> sample_;  // branch k of path i adds to one of its own, so that sums have one order
+  std::array<bool, kBatch> isSplit_;
+  std::vector<int> waiting_, free_;  // paths that are not active yet; places of path_
+  RayBatch rays_;                    // in the order of active_, like their hits
   std::array<RayHit, kBatch> query_;
   std::array<Hit, kBatch> hit_;
   std::array<SampleBlock, kBatch> block_;

@@ -21,8 +21,10 @@ constexpr uint64_t kPixelsOfPlace = 192, kMostPlaces = 2048;
 // As many passes of each bucket as make low-discrepancy points worth their name: what they do for light samples, more
 // light samples need not do.
 constexpr uint64_t kPasses = 16 * kSequenceBuckets;
-constexpr int kTried = 4;  // light samples of the paths that are held against those with one
-constexpr double kPays = 1.2;
+constexpr int kTried = 4;  // light samples, or directions, of the paths that are held against those with one
+constexpr double kPays = 1.2, kSplitsPay = 1.1;
+// Where light that comes straight from lamps is more than this share of the variance, directions have little to gain.
+constexpr double kMostDirectShare = 0.6;
 // Of a light sample with its shadow ray, in rays of paths with their shading.
 constexpr double kLightSampleCost = 1.2;
 // What counts as the brightness of a black place: this share of the mean.
@@ -30,30 +32,55 @@ constexpr double kDarkest = 0.1;
 // Means above this many times their place's brightness count as that.
 constexpr double kMostRelative = 8;
 
+}  // namespace
+
 // Paths over a grid, with the render's points.
-class Trial {
+class PathPreparation::Trial {
  public:
   Trial(const TransportContext& context, const Plan& plan)
       : context_(context), plan_(plan), grid_(plan.settings, places(plan.settings)) {
-    for (uint64_t k = 0; k < kPasses; ++k)
-      samplers_.emplace_back(plan.settings.sampler, plan.settings.seed, kStream, k);
+    const Settings& s = plan.settings;
+    const auto sampler = [&](uint64_t pass) { return PassSampler(s.sampler, s.seed, kStream, pass); };
+    for (uint64_t k = 0; k < kPasses; ++k) {
+      samplers_.push_back(sampler(k));
+      if (s.sampler == SamplerKind::Sobol && pathSplitsMeasured(plan).yes)
+        for (uint64_t b = 0; b < kTried; ++b) branches_.push_back(sampler(branchPass(k, b, kTried)));
+    }
+    one_ = trace(1, 1);
   }
 
-  LightSampleShares run() const {
-    const Outcome one = trace(1), more = trace(kTried);
+  // Variances are a + b / n, costs c + d n. With more light samples only direct light differs: the rest of the paths is
+  // the same, noise that would hide what is looked for.
+  SampleShares lightSamples() const {
+    const Outcome more = trace(kTried, 1);
+    const std::vector<double> scale = inverseBrightness(one_.mean, more.mean);
+    return shares(relativeVariance(one_.mean, scale),
+                  relativeVariance(one_.direct, scale) - relativeVariance(more.direct, scale), one_.cost, more.cost);
+  }
+  // Of paths with so many light samples.
+  SampleShares directions(int lightSamples) const {
+    const Outcome one = lightSamples == 1 ? one_ : trace(lightSamples, 1), more = trace(lightSamples, kTried);
     const std::vector<double> scale = inverseBrightness(one.mean, more.mean);
     const double variance = relativeVariance(one.mean, scale);
-    if (!(variance > 0) || !(one.cost > 0)) return {};
-    // Variances are a + b / n, costs c + d n. Only direct light differs: the rest of the paths is the same, noise that
-    // would hide what is looked for.
-    constexpr double kLess = 1 - 1.0 / kTried;
-    const double less = relativeVariance(one.direct, scale) - relativeVariance(more.direct, scale);
-    return {std::clamp(less / variance / kLess, 0.0, 1.0),
-            std::clamp((more.cost / one.cost - 1) / (kTried - 1), 0.0, 1.0)};
+    return shares(variance, variance - relativeVariance(more.mean, scale), one.cost, more.cost);
   }
+  // Share of direct light in the variance of paths with one of each.
+  double directShare() const {
+    const std::vector<double> scale = inverseBrightness(one_.mean, one_.mean);
+    const double variance = relativeVariance(one_.mean, scale);
+    return variance > 0 ? relativeVariance(one_.direct, scale) / variance : 1;
+  }
+  // Of two outcomes.
   size_t paths() const { return 2 * kPasses * grid_.size(); }
 
  private:
+  static SampleShares shares(double variance, double less, double cost, double costOfMore) {
+    if (!(variance > 0) || !(cost > 0)) return {};
+    constexpr double kLess = 1 - 1.0 / kTried;
+    return {std::clamp(less / variance / kLess, 0.0, 1.0),
+            std::clamp((costOfMore / cost - 1) / (kTried - 1), 0.0, 1.0)};
+  }
+
   using Buckets = std::vector<std::array<float, kSequenceBuckets>>;  // means by place
   struct Outcome {
     Buckets mean, direct;
@@ -65,7 +92,7 @@ class Trial {
     return std::min(pixels / kPixelsOfPlace, kMostPlaces);
   }
 
-  Outcome trace(int lightSamples) const {
+  Outcome trace(int lightSamples, int splits) const {
     Outcome outcome;
     outcome.mean.assign(grid_.size(), {});
     outcome.direct = outcome.mean;
@@ -74,7 +101,9 @@ class Trial {
       for (uint64_t pass = 0; pass < kPasses; ++pass) {
         const PassSampler& sampler = samplers_[pass];
         const auto kernel = std::make_unique<PathKernel>(context_, plan_, sampler, nullptr);
-        kernel->use({.lightSamples = lightSamples});
+        PathAids aids{.lightSamples = lightSamples, .splits = splits};
+        if (splits > 1 && !branches_.empty()) aids.branches = {&branches_[pass * kTried], kTried};
+        kernel->use(aids);
         for (size_t i = begin; i < end; ++i)
           kernel->start(grid_.x(i), grid_.y(i), sampler.itemKey(pixelItem(plan_, grid_.x(i), grid_.y(i))));
         kernel->run();
@@ -122,26 +151,31 @@ class Trial {
   const TransportContext& context_;
   const Plan& plan_;
   const PixelGrid grid_;
-  std::vector<PassSampler> samplers_;
+  std::vector<PassSampler> samplers_, branches_;
+  Outcome one_;
 };
 
-}  // namespace
-
-double lightSampleGain(const LightSampleShares& shares, int count) {
+double sampleGain(const SampleShares& shares, int count) {
   const auto n = static_cast<double>(count);
   return 1 / ((1 - shares.variance + shares.variance / n) * (1 + shares.cost * (n - 1)));
 }
 
-int lightSamplesThatPay(const LightSampleShares& shares) {
+int lightSamplesThatPay(const SampleShares& shares) {
   int best = 1;
   for (int n = 2; n <= kTried; ++n)
-    if (lightSampleGain(shares, n) > lightSampleGain(shares, best)) best = n;
-  return lightSampleGain(shares, best) >= kPays ? best : 1;
+    if (sampleGain(shares, n) > sampleGain(shares, best)) best = n;
+  return sampleGain(shares, best) >= kPays ? best : 1;
 }
 
-Applies lightSamplesMeasured(const Plan& plan) {
-  const Settings& s = plan.settings;
-  if (s.lightSamples > 0) return {false, fmt::format("{}, on request", s.lightSamples)};
+int pathSplitsThatPay(const SampleShares& shares) {
+  const int best = sampleGain(shares, kTried) > sampleGain(shares, 2) ? kTried : 2;
+  return sampleGain(shares, best) >= kSplitsPay ? best : 1;
+}
+
+namespace {
+
+Applies measured(const Settings& s, int asked) {
+  if (asked > 0) return {false, fmt::format("{}, on request", asked)};
   if (s.maxDepth < 2) return {false, "paths scatter nowhere"};
   if (static_cast<uint64_t>(s.width) * static_cast<uint64_t>(s.height) < kFewestPixels)
     return {false, fmt::format("one, for the frame has fewer than {} pixels: to measure would cost more than them",
@@ -149,27 +183,55 @@ Applies lightSamplesMeasured(const Plan& plan) {
   return {true, "measured before the first pass, and more than one where that pays"};
 }
 
+}  // namespace
+
+Applies lightSamplesMeasured(const Plan& plan) { return measured(plan.settings, plan.settings.lightSamples); }
+Applies pathSplitsMeasured(const Plan& plan) { return measured(plan.settings, plan.settings.pathSplits); }
+
 PathPreparation::PathPreparation(const TransportContext& context, const Plan& plan) {
   if (guidingApplies(plan).yes) {
     guide_.emplace(context, plan);
     decisions_ = guide_->decisions();
   }
   if (plan.settings.lightSamples > 0) lightSamples_ = plan.settings.lightSamples;
-  if (lightSamplesMeasured(plan).yes) measureLightSamples(context, plan);
+  if (plan.settings.pathSplits > 0) pathSplits_ = plan.settings.pathSplits;
+  const bool lights = lightSamplesMeasured(plan).yes, directions = pathSplitsMeasured(plan).yes;
+  if (!lights && !directions) return;
+  const Trial trial(context, plan);
+  if (lights) chooseLightSamples(trial);
+  if (directions) choosePathSplits(trial);
 }
 
-void PathPreparation::measureLightSamples(const TransportContext& context, const Plan& plan) {
-  const Trial trial(context, plan);
-  const LightSampleShares shares = trial.run();
+void PathPreparation::chooseLightSamples(const Trial& trial) {
+  const SampleShares shares = trial.lightSamples();
   lightSamples_ = lightSamplesThatPay(shares);
   const std::string found = fmt::format("they are {:.0f} % of the variance and {:.0f} % of the cost of {} paths",
                                         100 * shares.variance, 100 * shares.cost, trial.paths());
   if (lightSamples_ > 1)
     decisions_.push_back({true, "light samples",
                           fmt::format("{} at the first surface, variance x cost is {:.2f} times less: {}",
-                                      lightSamples_, lightSampleGain(shares, lightSamples_), found)});
+                                      lightSamples_, sampleGain(shares, lightSamples_), found)});
   else
     decisions_.push_back({false, "light samples", "more than one at the first surface would not pay: " + found});
+}
+
+void PathPreparation::choosePathSplits(const Trial& trial) {
+  const auto decide = [&](bool kept, std::string reason) {
+    decisions_.push_back({kept, "path splits", std::move(reason)});
+  };
+  if (const double direct = trial.directShare(); direct > kMostDirectShare)
+    return decide(false,
+                  fmt::format("direct light is {:.0f} % of the variance of {} paths", 100 * direct, trial.paths() / 2));
+  const SampleShares shares = trial.directions(lightSamples_);
+  pathSplits_ = pathSplitsThatPay(shares);
+  const std::string found = fmt::format("they are {:.0f} % of the variance and {:.0f} % of the cost of {} paths",
+                                        100 * shares.variance, 100 * shares.cost, trial.paths());
+  if (pathSplits_ > 1)
+    decide(true, fmt::format("{} directions from the first surface, variance x cost is {:.2f} times less: {}",
+                             pathSplits_, sampleGain(shares, pathSplits_), found));
+  else
+    decide(false, fmt::format("more than one direction from the first surface would not pay ({:.2f} times): {}",
+                              std::max(sampleGain(shares, 2), sampleGain(shares, kTried)), found));
 }
 
 }  // namespace braid

@@ -21,6 +21,11 @@ struct PathState {
   int panes = 0;          // passed straight; they are no vertices
   uint32_t salt = 0;      // of stochastic coverage, one per ray
   uint64_t key = 0;       // of the path's random numbers
+  // Its points: those of the camera's path, or of one of the branches that it is split into, which share a key.
+  const PassSampler* points = nullptr;
+  uint64_t pointsKey = 0;
+  int sample = 0;      // that it adds to
+  int directions = 1;  // that its vertex goes on in
   float time = 0;
 
   // The last vertex that scattered, for the weight of light found by the direction sampled there.
@@ -31,8 +36,9 @@ struct PathState {
   float lastLightSamples = 1;
   bool lightCouldNotBeSampled = true;  // camera, delta scattering, or a null interface or a medium's event since
 
-  float rouletteScale = 1;    // undoes in Russian roulette the radiance compression of refraction, and the guide
+  float rouletteScale = 1;    // undoes in Russian roulette the radiance compression of refraction, guide and splits
   int bounces = 0;            // scattered at the first non-specular vertex and since; up to 1 of them, light is direct
+  bool isBranch = false;      // of a path that was split, which is done once
   bool featuresDone = false;  // the first non-specular vertex is behind
   float featureDistance = 0;  // metres travelled up to it
 

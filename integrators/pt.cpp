@@ -30,11 +30,13 @@ class PathTracer final : public Integrator {
     return std::make_shared<PathPreparation>(context, plan);
   }
   std::vector<PlanLine> planLines(const Plan& plan) const override {
-    const Applies guiding = guidingApplies(plan), samples = lightSamplesMeasured(plan);
+    const Applies guiding = guidingApplies(plan), samples = lightSamplesMeasured(plan),
+                  splits = pathSplitsMeasured(plan);
     return {{guiding.yes, "path guiding",
              guiding.yes && guiding.reason.empty() ? "learned before the first pass, and used where it pays"
                                                    : guiding.reason},
-            {samples.yes || plan.settings.lightSamples > 0, "light samples", samples.reason}};
+            {samples.yes || plan.settings.lightSamples > 0, "light samples", samples.reason},
+            {splits.yes || plan.settings.pathSplits > 0, "path splits", splits.reason}};
   }
   WorkingMemory workingMemory(const Plan& plan) const override {
     if (!guidingApplies(plan).yes) return {};

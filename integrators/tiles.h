@@ -96,6 +96,26 @@ inline void renderTile(const Integrator& integrator, const PassRequest& request,
       [&] { kernel.run(); }, [&](int i, int x, int y) { storeSample(request, x, y, kernel.sample(i), target); });
 }
 
+// The points of a pass: of the paths from the camera, and of the branches that they are split into.
+class PathPoints {
+ public:
+  PathPoints(const Integrator& integrator, const Plan& plan, uint64_t pass, int splits)
+      : camera_(integrator.pixelSampler(plan, pass)) {
+    if (splits == 1 || plan.settings.sampler != SamplerKind::Sobol) return;
+    const auto n = static_cast<uint64_t>(splits);
+    for (uint64_t k = 0; k < n; ++k) branches_.push_back(*integrator.pixelSampler(plan, branchPass(pass, k, n)));
+  }
+  const PassSampler& camera() const { return *camera_; }
+  PathAids with(PathAids aids) const {
+    aids.branches = branches_;
+    return aids;
+  }
+
+ private:
+  std::unique_ptr<PassSampler> camera_;
+  std::vector<PassSampler> branches_;
+};
+
 // The same of the tiles that request.tiles names.
 bool renderPlacedTiles(const Integrator& integrator, const PassRequest& request, PassTarget& target,
                        const PathAids& aids);
@@ -106,11 +126,11 @@ inline bool renderCameraPaths(const Integrator& integrator, const PassRequest& r
                               const PathAids& aids = {}) {
   if (request.tiles) return renderPlacedTiles(integrator, request, target, aids);
   const Plan& plan = request.plan;
-  const std::unique_ptr<PassSampler> sampler = integrator.pixelSampler(plan, request.pass);
+  const PathPoints points(integrator, plan, request.pass, aids.splits);
   return forEachTile(request, [&](const PixelWindow& tile, std::vector<RecordedRay>* record) {
-    PathKernel kernel(request.context, plan, *sampler, record, integrator.roulette());
-    kernel.use(aids);
-    renderTile(integrator, request, *sampler, tile, kernel, target);
+    PathKernel kernel(request.context, plan, points.camera(), record, integrator.roulette());
+    kernel.use(points.with(aids));
+    renderTile(integrator, request, points.camera(), tile, kernel, target);
     return TileCounts{pixelCount(tile), kernel.rayCount, kernel.shadowRayCount};
   });
 }

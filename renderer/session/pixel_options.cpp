@@ -57,6 +57,7 @@ std::vector<StateOption> pixelOptions(const Plan& plan) {
       {"--lights", toString(s.lightStrategy)},
       {"--guiding", toString(s.guiding)},
       {"--light-samples", s.lightSamples > 0 ? std::to_string(s.lightSamples) : "auto"},
+      {"--path-splits", s.pathSplits > 0 ? std::to_string(s.pathSplits) : "auto"},
       {"--clamp", fmt::format("{}", s.clamp)},
       {"--background",
        s.background ? fmt::format("{},{},{}", s.background->x, s.background->y, s.background->z) : "none"},

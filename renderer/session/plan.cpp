@@ -260,7 +260,7 @@ uint64_t Plan::hash() const {
   h.add(fmt::format("{} {} {} {} {} {} {} {}", settings.width, settings.height, settings.maxDepth, settings.seed,
                     static_cast<int>(settings.sampler), toString(settings.filter), settings.clamp,
                     settings.transparent));
-  h.add(fmt::format("{} {}", static_cast<int>(settings.guiding), settings.lightSamples));
+  h.add(fmt::format("{} {} {}", static_cast<int>(settings.guiding), settings.lightSamples, settings.pathSplits));
   h.add(fmt::format("{} {} {} {}", settings.photons, settings.photonRadius, settings.photonDirect,
                     settings.photonAiming));
   return h.value();

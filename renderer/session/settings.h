@@ -19,6 +19,7 @@ enum class PixelFilter { Box, Gaussian, BlackmanHarris };
 enum class Guiding { Automatic, On, Off };
 
 inline constexpr int kMostLightSamples = 64;
+inline constexpr int kMostPathSplits = 8;
 
 struct Settings {
   int width = 1280, height = 720;  // full frame, pixels
@@ -35,6 +36,7 @@ struct Settings {
   LightStrategy lightStrategy = LightStrategy::Automatic;
   Guiding guiding = Guiding::Automatic;
   int lightSamples = 0;  // of a camera path of pt at its first surface that is no mirror; 0: as many as pay
+  int pathSplits = 0;    // directions that such a path goes on in from there; 0: as many as pay
   KeptBuffers keep{.features = true};
   bool transparent = false;            // camera rays that miss: no radiance, alpha 0
   std::optional<Spectrum> background;  // what camera rays that miss see instead of the environment

@@ -7,6 +7,7 @@
 #include "integrators/path_preparation.h"
 #include "integrators/path_kernel.h"
 #include "integrators/registry.h"
+#include "integrators/tiles.h"
 #include "integrators/bidirectional/strategies.h"
 #include "renderer/core/error.h"
 #include "renderer/film/files/exr.h"
@@ -149,11 +150,15 @@ int runReplay(const ReplayOptions& o) {
   if (!sampler)
     throw Error(ExitCode::Usage, fmt::format("integrator '{}' has no camera paths to replay", integrator.name()));
 
+  std::optional<PathPoints> points;
   PrintingObserver observer(scene);
   PathKernel kernel(context, plan, *sampler, nullptr, integrator.roulette());
   kernel.observe(&observer);
   const auto preparation = integrator.prepare(context, plan);
-  if (const auto* paths = dynamic_cast<const PathPreparation*>(preparation.get())) kernel.use(paths->aids());
+  if (const auto* paths = dynamic_cast<const PathPreparation*>(preparation.get())) {
+    points.emplace(integrator, plan, o.pass, paths->aids().splits);
+    kernel.use(points->with(paths->aids()));
+  }
   fmt::print("{} pass {} pixel {},{} of {}x{}\n", integrator.name(), o.pass, x, y, settings.width, settings.height);
   kernel.start(x, y, integrator.pixelKey(*sampler, plan, x, y));
   kernel.run();

@@ -177,6 +177,9 @@ void addSampleOptions(CLI::App& command, SampleChoice& c) {
   command.add_option("--light-samples", c.lightSamples, "Lights that a path of pt samples at its first surface")
       ->default_str("as many as pay")
       ->check(wholeNumber(1, kMostLightSamples));
+  command.add_option("--path-splits", c.pathSplits, "Directions that a path of pt goes on in from its first surface")
+      ->default_str("as many as pay")
+      ->check(wholeNumber(1, kMostPathSplits));
   addThreads(command, c.threads);
   command.add_option("--clamp", c.clamp, "Clamp a path's radiance (biased; 0: off)")
       ->capture_default_str()
@@ -207,6 +210,7 @@ Settings makeSettings(const SceneChoice& scene, const SampleChoice& samples) {
   s.lightStrategy = samples.lights;
   s.guiding = samples.guiding;
   s.lightSamples = samples.lightSamples;
+  s.pathSplits = samples.pathSplits;
   s.threads = samples.threads;
   s.clamp = static_cast<float>(samples.clamp);
   s.photons = samples.photons;

@@ -22,6 +22,7 @@ Scene suiteScene(const std::string& name) { return Scene(loadGltf(sourcePath("sc
 
 Settings withSamples(Settings s, int count) {
   s.lightSamples = count;
+  s.pathSplits = 1;
   return s;
 }
 
@@ -97,12 +98,12 @@ TEST_CASE("light samples: as many as the shares of variance and cost ask for") {
   CHECK(lightSamplesThatPay({0.5, 0.2}) == 1);  // they gain, but too little to be believed
   CHECK(lightSamplesThatPay({0.8, 0.25}) == 3);
   CHECK(lightSamplesThatPay({1, 0}) == 4);
-  CHECK(lightSampleGain({0.6, 0.2}, 2) == doctest::Approx(1 / (0.7 * 1.2)));
+  CHECK(sampleGain({0.6, 0.2}, 2) == doctest::Approx(1 / (0.7 * 1.2)));
 }
 
 TEST_CASE("light samples: measured in frames that are worth it, and said") {
   int count = 0;
-  const Settings frame = settingsOf("pt", 256, 144, 1, 0, SamplerKind::Sobol);
+  const Settings frame = withSamples(settingsOf("pt", 256, 144, 1, 0, SamplerKind::Sobol), 0);
   const std::string kept = decisionOf(suiteScene("plates"), frame, count);
   CHECK(count >= 2);
   CHECK(contains(kept, fmt::format("{} at the first surface", count)));
@@ -110,7 +111,7 @@ TEST_CASE("light samples: measured in frames that are worth it, and said") {
   const std::string left = decisionOf(Scene(cornellBox()), frame, count);
   CHECK(count == 1);
   CHECK(contains(left, "would not pay"));
-  CHECK(decisionOf(Scene(cornellBox()), settingsOf("pt", 64, 36, 1), count).empty());
+  CHECK(decisionOf(Scene(cornellBox()), withSamples(settingsOf("pt", 64, 36, 1), 0), count).empty());
   CHECK(count == 1);
   decisionOf(Scene(cornellBox()), withSamples(frame, 6), count);
   CHECK(count == 6);

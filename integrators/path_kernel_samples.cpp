@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// The lights that a path samples at its vertices.
+// What a path samples: lights at its vertices, and directions where it is split.
 #include "integrators/path_kernel.h"
 #include "renderer/transport/mis.h"
 #include "renderer/transport/shadow_ray.h"
 
 namespace braid {
+
+namespace {
+
+constexpr uint64_t kBranchKey = 0x6272616e6368;
+
+}  // namespace
 
 LightChoice lightChoice(const SampleBlock& block, int k, int count) {
   constexpr float kStepU = 0.7548777f, kStepV = 0.5698403f;  // of the plastic number (Roberts 2018, R2)
@@ -47,7 +53,8 @@ bool PathKernel::connectLight(const PathState& path, const Hit& hit, const Guide
   const BsdfValue value = bsdf.evaluate(wi);
   if (isBlack(value.f)) return false;
 
-  const float weight = light.delta ? 1.0f : powerHeuristic(light.pdfW, value.pdfW);
+  const float weight =
+      light.delta ? 1.0f : powerHeuristic(light.pdfW, value.pdfW * static_cast<float>(path.directions));
   shadow.contribution = path.throughput * value.f * light.radiance * (weight / light.pdfW);
   setShadowRay(hit, light.wi, light.distance, mix32(path.salt ^ 0x51ed270bu) & ~kCameraRay, shadow.ray);
   const bool volume = context_.summaryOf(hit).volume;
@@ -85,7 +92,64 @@ void PathKernel::sampleLights(int p, size_t ray, const GuidedBsdf& bsdf, bool fo
     shadow.forFeatures = forFeatures && k == 0;
     shadow.direct = path.bounces == 0;
     shadowRays_.set(shadowCount_, shadow.ray, shadow.index);
-    shadowPath_[static_cast<size_t>(shadowCount_++)] = p;
+    shadowPath_[static_cast<size_t>(shadowCount_++)] = path.sample;
+  }
+}
+
+void PathKernel::use(const PathAids& aids) {
+  aids_ = aids;
+  const auto places = static_cast<size_t>(kBatch * aids.splits);
+  if (aids.splits > 1 && path_.size() < places) {
+    path_.resize(places);
+    sample_.resize(kBatch + places);
+  }
+}
+
+// Every branch carries its share of the path. Branch k takes point n i + k of a sequence where the path took point i,
+// so that the directions of all passes together are spread as those of n times as many passes would be. Those that go
+// on wait for room in the batch; true when the last of them, which takes the path's place, goes on.
+bool PathKernel::split(int p, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided) {
+  PathState& path = path_[static_cast<size_t>(p)];
+  const auto first = static_cast<size_t>(kBatch + path.sample * aids_.splits);
+  isSplit_[static_cast<size_t>(path.sample)] = true;
+  const float share = 1 / static_cast<float>(aids_.splits);
+  path.throughput *= share;
+  path.rouletteScale *= share;
+  path.isBranch = true;
+  const PathState whole = path;
+  for (int k = 0; k < aids_.splits; ++k) {
+    const bool last = k == aids_.splits - 1;
+    const int place = last ? p : free_.back();
+    PathState& branch = path_[static_cast<size_t>(place)];
+    branch = whole;
+    branch.sample = static_cast<int>(first) + k;
+    std::construct_at(&sample_[first + static_cast<size_t>(k)]);
+    branch.key = hashCombine(whole.key, kBranchKey + static_cast<uint64_t>(k));
+    if (aids_.branches.empty()) {
+      branch.pointsKey = branch.key;
+    } else {
+      branch.points = &aids_.branches[static_cast<size_t>(k)];
+      branch.pointsKey = hashCombine(whole.pointsKey, kBranchKey);
+    }
+    const bool goesOn = scatter(branch, hit, bsdf, twoSided, branch.points->block(branch.pointsKey, branch.block()));
+    if (last) return goesOn;
+    if (!goesOn) continue;
+    free_.pop_back();
+    waiting_.push_back(place);
+  }
+  return false;
+}
+
+void PathKernel::addBranches() {
+  if (aids_.splits == 1) return;
+  for (int i = 0; i < count_; ++i) {
+    const auto path = static_cast<size_t>(i);
+    if (!isSplit_[path]) continue;
+    for (int k = 0; k < aids_.splits; ++k) {
+      const PathSample& branch = sample_[static_cast<size_t>(kBatch + i * aids_.splits + k)];
+      sample_[path].radiance += branch.radiance;
+      sample_[path].direct += branch.direct;
+    }
   }
 }
 
