@@ -22,11 +22,13 @@ constexpr uint64_t kPixelsOfPlace = 192, kMostPlaces = 2048;
 // light samples need not do.
 constexpr uint64_t kPasses = 16 * kSequenceBuckets;
 constexpr int kTried = 4;  // light samples, or directions, of the paths that are held against those with one
-constexpr double kPays = 1.2, kSplitsPay = 1.1;
+constexpr double kPays = 1.2, kSplitsPay = 1.05;
 // Where light that comes straight from lamps is more than this share of the variance, directions have little to gain.
 constexpr double kMostDirectShare = 0.6;
 // Of a light sample with its shadow ray, in rays of paths with their shading.
 constexpr double kLightSampleCost = 1.2;
+// Parts of the places, which are left out in turn.
+constexpr size_t kParts = 16;
 // What counts as the brightness of a black place: this share of the mean.
 constexpr double kDarkest = 0.1;
 // Means above this many times their place's brightness count as that.
@@ -57,12 +59,17 @@ class PathPreparation::Trial {
     return shares(relativeVariance(one_.mean, scale),
                   relativeVariance(one_.direct, scale) - relativeVariance(more.direct, scale), one_.cost, more.cost);
   }
-  // Of paths with so many light samples.
-  SampleShares directions(int lightSamples) const {
+  // Of paths with so many light samples: by all places, then with one part of them left out after the other.
+  std::vector<SampleShares> directions(int lightSamples) const {
     const Outcome one = lightSamples == 1 ? one_ : trace(lightSamples, 1), more = trace(lightSamples, kTried);
     const std::vector<double> scale = inverseBrightness(one.mean, more.mean);
-    const double variance = relativeVariance(one.mean, scale);
-    return shares(variance, variance - relativeVariance(more.mean, scale), one.cost, more.cost);
+    std::vector<SampleShares> found;
+    for (size_t leftOut = 0; leftOut <= kParts; ++leftOut) {
+      const size_t part = leftOut == 0 ? kParts : leftOut - 1;
+      const double variance = relativeVariance(one.mean, scale, part);
+      found.push_back(shares(variance, variance - relativeVariance(more.mean, scale, part), one.cost, more.cost));
+    }
+    return found;
   }
   // Share of direct light in the variance of paths with one of each.
   double directShare() const {
@@ -134,9 +141,10 @@ class PathPreparation::Trial {
     return scale;
   }
 
-  double relativeVariance(const Buckets& buckets, const std::vector<double>& scale) const {
+  double relativeVariance(const Buckets& buckets, const std::vector<double>& scale, size_t leftOut = kParts) const {
     double total = 0;
     for (size_t i = 0; i < grid_.size(); ++i) {
+      if (i % kParts == leftOut) continue;
       double sum = 0, squares = 0;
       for (const float mean : buckets[i]) {
         const double v = std::min(static_cast<double>(mean) * scale[i], kMostRelative);
@@ -167,9 +175,17 @@ int lightSamplesThatPay(const SampleShares& shares) {
   return sampleGain(shares, best) >= kPays ? best : 1;
 }
 
-int pathSplitsThatPay(const SampleShares& shares) {
+double sampleGainError(std::span<const SampleShares> without, int count) {
+  double mean = 0, squares = 0;
+  const auto n = static_cast<double>(without.size());
+  for (const SampleShares& s : without) mean += sampleGain(s, count) / n;
+  for (const SampleShares& s : without) squares += sqr(sampleGain(s, count) - mean);
+  return without.empty() ? 0 : std::sqrt(squares * (n - 1) / n);
+}
+
+int pathSplitsThatPay(const SampleShares& shares, std::span<const SampleShares> without) {
   const int best = sampleGain(shares, kTried) > sampleGain(shares, 2) ? kTried : 2;
-  return sampleGain(shares, best) >= kSplitsPay ? best : 1;
+  return sampleGain(shares, best) - sampleGainError(without, best) >= kSplitsPay ? best : 1;
 }
 
 namespace {
@@ -222,16 +238,20 @@ void PathPreparation::choosePathSplits(const Trial& trial) {
   if (const double direct = trial.directShare(); direct > kMostDirectShare)
     return decide(false,
                   fmt::format("direct light is {:.0f} % of the variance of {} paths", 100 * direct, trial.paths() / 2));
-  const SampleShares shares = trial.directions(lightSamples_);
-  pathSplits_ = pathSplitsThatPay(shares);
-  const std::string found = fmt::format("they are {:.0f} % of the variance and {:.0f} % of the cost of {} paths",
-                                        100 * shares.variance, 100 * shares.cost, trial.paths());
+  const std::vector<SampleShares> found = trial.directions(lightSamples_);
+  const std::span<const SampleShares> without = std::span(found).subspan(1);
+  pathSplits_ = pathSplitsThatPay(found[0], without);
+  const int told = pathSplits_ > 1 ? pathSplits_ : 2;
+  const std::string gain =
+      fmt::format("{:.2f} ± {:.2f} times less: they are {:.0f} % of the variance and {:.0f} % of the cost of {} paths",
+                  sampleGain(found[0], told), sampleGainError(without, told), 100 * found[0].variance,
+                  100 * found[0].cost, trial.paths());
   if (pathSplits_ > 1)
-    decide(true, fmt::format("{} directions from the first surface, variance x cost is {:.2f} times less: {}",
-                             pathSplits_, sampleGain(shares, pathSplits_), found));
+    decide(true, fmt::format("{} directions from the first surface, variance x cost is {}", pathSplits_, gain));
   else
-    decide(false, fmt::format("more than one direction from the first surface would not pay ({:.2f} times): {}",
-                              std::max(sampleGain(shares, 2), sampleGain(shares, kTried)), found));
+    decide(false, fmt::format("more than one direction from the first surface would not pay, variance x cost of two is "
+                              "{}",
+                              gain));
 }
 
 }  // namespace braid

@@ -7,6 +7,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "integrators/guide_preparation.h"
@@ -25,8 +26,11 @@ struct SampleShares {
 double sampleGain(const SampleShares& shares, int count);
 // The number of samples with the least variance x cost; 1 where others gain too little to be believed.
 int lightSamplesThatPay(const SampleShares& shares);
-// The same of directions, of which there are powers of two.
-int pathSplitsThatPay(const SampleShares& shares);
+// The same of directions, of which there are powers of two. `without` holds the shares with one part of the pixels left
+// out after the other, which tell how far the gain is to be believed.
+int pathSplitsThatPay(const SampleShares& shares, std::span<const SampleShares> without);
+// The standard error of the gain, by these parts (jackknife).
+double sampleGainError(std::span<const SampleShares> without, int count);
 
 // Whether the number of light samples, or of directions, is measured.
 Applies lightSamplesMeasured(const Plan& plan);

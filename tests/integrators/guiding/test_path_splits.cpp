@@ -139,10 +139,18 @@ TEST_CASE("path splits: four directions leave less than half of the variance of 
 }
 
 TEST_CASE("path splits: as many as the shares of variance and cost ask for") {
-  CHECK(pathSplitsThatPay({0, 0.1}) == 1);
-  CHECK(pathSplitsThatPay({0.6, 0.8}) == 1);
-  CHECK(pathSplitsThatPay({0.8, 0.3}) == 4);
-  CHECK(pathSplitsThatPay({0.7, 0.3}) == 2);
+  CHECK(pathSplitsThatPay({0, 0.1}, {}) == 1);
+  CHECK(pathSplitsThatPay({0.6, 0.8}, {}) == 1);
+  CHECK(pathSplitsThatPay({0.8, 0.3}, {}) == 4);
+  CHECK(pathSplitsThatPay({0.7, 0.3}, {}) == 2);
+  // The parts agree, or one of them makes all of the gain.
+  const std::vector<SampleShares> agree(16, {0.8, 0.3});
+  std::vector<SampleShares> one = agree;
+  one[3].variance = 0.6;
+  CHECK(sampleGainError(agree, 4) == doctest::Approx(0));
+  CHECK(sampleGainError(one, 4) == doctest::Approx((sampleGain(agree[0], 4) - sampleGain(one[3], 4)) * 15 / 16));
+  CHECK(pathSplitsThatPay({0.8, 0.3}, agree) == 4);
+  CHECK(pathSplitsThatPay({0.8, 0.3}, one) == 1);
   CHECK(sampleGain({0.8, 0.3}, 4) == doctest::Approx(1 / (0.4 * 1.9)));
 }
 
