@@ -8,19 +8,15 @@
 namespace braid {
 
 // Minimises wᵀMw with w >= 0 and sum(w) = 1 for blocks of 4x4 pixels (block_errors.h), with errors relative to a common
-// brightness (error_scale.h), and smooths the maps along surfaces. M starts as the mean E of e_i e_j over the image.
-// Windows of about 36, then of about 12 pixels draw it to their own mean,
-//   M <- M + s (m - M),   s = max(0, 1 - N / S),
-// with m the mean over the window, averaged over both pairings of halves A and B. S is the squared distance of m to M
-// in how much better one candidate is than another, m_ii - m_jj, summed over all pairs of candidates and over
-// neighbouring windows, and N what noise alone makes of it, by two measures of which the larger counts for every pair:
-//   the squared distance of the pairings to their mean, for pairings know nothing of each other's noise, and
-//   8 (2 / n) r d², with n the pixels of the window, d² = m_ii + m_jj - 2 m_ij how far the candidates are apart, and r
-//   the noise of x (pooled_noise.h): r alone moves m_ii - m_jj by a variance of (2 / n) r d². Two pairings agree by
-//   chance now and then, and then islands of the noisier candidate would stand in what is smooth.
-// So the wider scale is a prior whose weight follows from the noise of the narrower one (empirical Bayes: the positive
-// part of James and Stein), and with many samples the windows have the last word. One map a candidate, of all channels
-// together. All images have halves; the features may be absent.
+// brightness (error_scale.h), and smooths the maps along surfaces. M starts as the mean of e_i e_j over the image.
+// Windows of about 36, then of about 12 pixels draw it to their own mean m, averaged over both pairings of halves,
+//   M <- M + s (m - M),   s = max(0, 1 - N / S).
+// S is the squared distance of m to M in how much better one candidate is than another, m_ii - m_jj, over all pairs and
+// neighbouring windows; N is what noise makes of it, for every pair the larger of the squared distance of the pairings
+// to their mean and 8 (2 / n) r (m_ii + m_jj - 2 m_ij), with n the pixels of a window and r the noise of x
+// (pooled_noise.h): pairings agree by chance now and then. So the wider scale is a prior whose weight follows from the
+// noise of the narrower one (the positive part of James and Stein), and with many samples windows have the last word.
+// One map a candidate, of all channels together. All images have halves; the features may be absent.
 WeightMaps scaleWeights(const Estimate& x, const std::vector<const Estimate*>& candidates, const Features* features);
 
 }  // namespace braid
