@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "braid/place_samples.h"
 #include "integrators/path_preparation.h"
 #include "renderer/core/error.h"
 #include "renderer/scene/data/gltf.h"
@@ -136,6 +137,25 @@ TEST_CASE("path splits: four directions leave less than half of the variance of 
     MESSAGE("variance of one over that of four: ", variance[0] / variance[1]);
     CHECK(variance[1] < 0.5 * variance[0]);
   }
+}
+
+// Placed passes make the points of their branches by themselves.
+TEST_CASE("path splits: placed samples have the same mean, and the same bits for any number of threads") {
+  const Scene scene(cornellBox());
+  Settings plain = split(settingsOf("pt", 24, 24, 48, 1, SamplerKind::Sobol), 4), placed = plain;
+  placed.placement = "none";
+  placed.seed = 2;
+  std::vector<RenderResult> results;
+  for (const int threads : {1, 2, 5}) {
+    placed.threads = threads;
+    Session session = sessionOf(scene, placed);
+    session.placeBy(errorsForPlacement(placed.placement));
+    results.push_back(session.run());
+  }
+  CHECK_FALSE(estimateOf(results[0]).samples.empty());
+  CHECK(sameBits(estimateOf(results[0]).mean, estimateOf(results[1]).mean));
+  CHECK(sameBits(estimateOf(results[0]).mean, estimateOf(results[2]).mean));
+  CHECK(zScore(meanOf(results[0]), meanOf(render(scene, plain))) < kSigmas);
 }
 
 TEST_CASE("path splits: as many as the shares of variance and cost ask for") {
