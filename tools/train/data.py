@@ -26,6 +26,12 @@ SAMPLES = ((1, 2), (4, 4, 8), (16, 32))
 PLANES = 18  # kKpnPlanes
 
 
+def run(*call):
+    done = subprocess.run(call, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+    if done.returncode:
+        raise RuntimeError(done.stderr.strip())
+
+
 def read(path, attribute="braid/kpn/kpn-exposure"):
     """The channels of an EXR by name, and an attribute."""
     image = oiio.ImageInput.open(path)
@@ -51,36 +57,38 @@ def inputs(channels):
     return half(np.stack(planes))
 
 
+def worth_seeing(truth):
+    return truth.mean() > 1e-4 and np.median(truth.std(axis=(1, 2))) >= 0.02 * truth.mean()
+
+
 class Renderer:
     def __init__(self, options, folder):
         self.program, self.size, self.target, self.folder = options.braid, options.size, options.target, folder
 
     def render(self, scene, camera, more, samples, seed, name):
         out = os.path.join(self.folder, name)
-        call = [self.program, "render", scene["file"], "-o", out, "--integrator", "pt", "--spp", str(samples), "--seed",
-                str(seed), "--size", self.size, "--look-at", camera["look_at"], "--yfov", str(camera["yfov"]),
-                "--threads", "1", "-q", "--float", "--aovs", "all"] + scene["options"] + more
-        done = subprocess.run(call, stderr=subprocess.PIPE, text=True)
-        if done.returncode:
-            raise RuntimeError(done.stderr.strip())
+        run(self.program, "render", scene["file"], "-o", out, "--spp", str(samples), "--seed", str(seed), "--size", self.size,
+            "--look-at", camera["look_at"], "--yfov", str(camera["yfov"]), "--threads", "1", "-q", "--float", "--aovs", "all",
+            *scene["options"], *more)
         return out
 
     def planes(self, image):
         out = os.path.join(self.folder, "planes.exr")
-        subprocess.run([self.program, "combine", "--unbiased", image, "--method", "kpn", "--kpn-planes", "1", "--weights",
-                        "--float", "-q", "-o", out], check=True, stderr=subprocess.DEVNULL)
+        run(self.program, "combine", "--unbiased", image, "--method", "kpn", "--kpn-planes", "1", "--weights", "--float",
+            "-q", "-o", out)
         return read(out)
 
     def view(self, scene, camera, seed, view):
         """Planes and target of each number of samples, or None where there is nothing to see."""
-        target, _ = read(self.render(scene, camera, ["--combine", "auto"], self.target, 7000 + seed, "target.exr"))
+        target, _ = read(self.render(scene, camera, ["--integrator", "pt", "--combine", "auto"], self.target, 7000 + seed, "target.exr"))
         truth = rgb(target, "")
-        if not truth.mean() > 1e-4 or np.median(truth.std(axis=(1, 2))) < 0.02 * truth.mean():
+        if not worth_seeing(truth):
             return None
         arrays, chosen = {}, []
         for group, candidates in enumerate(SAMPLES):
             samples = candidates[(seed + view) % len(candidates)]
-            image = self.render(scene, camera, ["--combine", "none"], samples, 10 * seed + group, "image.exr")
+            image = self.render(scene, camera, ["--integrator", "pt", "--combine", "none"], samples, 10 * seed + group,
+                                "image.exr")
             channels, exposure = self.planes(image)
             arrays[f"x{group}"] = inputs(channels)
             arrays[f"exposure{group}"] = np.float32(exposure)
@@ -88,27 +96,28 @@ class Renderer:
         return {"target": truth.astype(np.float32), "samples": np.array(chosen), **arrays}
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def make_views(description, size, views, renderer_of):
+    """The command line of a script of data: renders so many views of every scene named and writes what is kept."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("first", type=int)
     parser.add_argument("end", type=int)
     parser.add_argument("folder")
     parser.add_argument("--braid", default="tools/braid")
-    parser.add_argument("--size", default="192x128")
+    parser.add_argument("--size", default=size)
     parser.add_argument("--target", type=int, default=96)
     options = parser.parse_args()
     import scenes  # reads the repository's generator
 
     os.makedirs(options.folder, exist_ok=True)
     for seed in range(options.first, options.end):
-        names = [os.path.join(options.folder, f"{seed:05}_{view}.npz") for view in range(3)]
+        names = [os.path.join(options.folder, f"{seed:05}_{view}.npz") for view in range(views)]
         if all(os.path.exists(name) for name in names):
             continue
         with tempfile.TemporaryDirectory() as folder:
             scene = scenes.make(seed, folder)
             scene["file"] = os.path.join(folder, f"{seed}.glb")
-            renderer = Renderer(options, folder)
-            for view, camera in enumerate(scene["cameras"][:3]):
+            renderer = renderer_of(options, folder)
+            for view, camera in enumerate(scene["cameras"][:views]):
                 if os.path.exists(names[view]):
                     continue
                 try:
@@ -123,4 +132,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    make_views(__doc__, "192x128", 3, Renderer)
