@@ -8,6 +8,7 @@ A scene is made and rendered small; training lowers the error of its views; kern
 braid makes the same images with the exported networks as torch does.
 """
 
+import math
 import os
 import subprocess
 import sys
@@ -104,9 +105,11 @@ def check_shrinkage(braid, folder):
     for method, more in (("js-neural", []), ("double-shrinkage-neural", ["--double-shrinkage-chosen", "0"])):
         weights, exported, out = (os.path.join(folder, method + end) for end in (".pt", ".network", ".exr"))
         errors = []
-        for seconds in ("0", "12"):
-            python("shrinkage_train.py", method, views, "--validation", views, "-o", weights, "--seconds", seconds)
-            errors.append(sum(torch.load(weights)["record"]["validation"]["network"].values()))
+        for seconds in ("0", "15"):
+            python("shrinkage_train.py", method, views, "--validation", views, "-o", weights, "--seconds", seconds,
+                   "--rate", "0.01")
+            found = torch.load(weights)["record"]["validation"]["network"].values()
+            errors.append(sum(math.log(error) for error in found))
         assert errors[1] < errors[0], f"training of {method} did not help: {errors[0]} became {errors[1]}"
         python("export.py", weights, exported)
         run(braid, "combine", "--unbiased", image, "--method", method + "@sppm", f"--{method}-network", exported, *more,

@@ -76,7 +76,7 @@ def validated(model, views):
             for name, image in images.items():
                 error = relative_error(image, torch.from_numpy(target[None, :, :height, :width])).mean().item()
                 sums.setdefault(name, {}).setdefault(samples, []).append(math.log(error + 1e-9))
-    mean = lambda logs: float(f"{math.exp(sum(logs) / len(logs)):.3g}")
+    mean = lambda logs: float(f"{math.exp(sum(logs) / len(logs)):.4g}")
     return {name: {s: mean(logs) for s, logs in sorted(of.items())} for name, of in sums.items()}
 
 
@@ -89,7 +89,7 @@ def main():
     parser.add_argument("--resume", default="")
     parser.add_argument("--seconds", type=float, default=900)
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--rate", type=float, default=1e-3)
+    parser.add_argument("--rate", type=float, default=4e-3)
     parser.add_argument("--crops", type=int, default=4)
     parser.add_argument("--side", type=int, default=64)
     parser.add_argument("--seed", type=int, default=1)
@@ -120,7 +120,7 @@ def main():
             views.refresh()
             if seconds >= o.seconds:
                 break
-        rate = o.rate * min(1, (step + 1) / 100) * (0.5 + 0.5 * math.cos(math.pi * seconds / o.seconds) + 0.01)
+        rate = o.rate * min(1, (step + 1) / 30) * (0.5 + 0.5 * math.cos(math.pi * seconds / o.seconds) + 0.01)
         for group in optimiser.param_groups:
             group["lr"] = rate
         planes, target = augmented(*views.crops(o.crops, o.side, rng), rng)
