@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Samples that are placed by the error: the map, the film's estimates, and renders that use them.
+#include <filesystem>
+
 #include "braid/place_samples.h"
 #include "combiners/pipeline/registry.h"
 #include "renderer/core/parallel.h"

@@ -7,22 +7,19 @@
 New views in the folders are found while it runs. Weights are saved every few minutes, averaged over the last steps.
 """
 
-import argparse
-import copy
 import glob
-import json
 import math
 import os
-import random
 import sys
-import time
 
 import numpy as np
 import torch
 import torch.nn.functional as functional
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import training
 from network import KernelPrediction, LUMINANCE, luminance
+from training import flipped
 
 DARK = 0.003  # squared brightness below which errors stop being relative
 ALBEDO, NORMAL, MISS = slice(7, 10), slice(10, 13), 15
@@ -50,31 +47,10 @@ def loss_of(result, target):
     return torch.log(error + 1e-4).mean()
 
 
-class Views:
-    def __init__(self, folders):
-        self.folders, self.views, self.seen = folders, [], set()
-        self.refresh()
-
-    def refresh(self):
-        for name in sorted(sum((glob.glob(os.path.join(f, "*.npz")) for f in self.folders), [])):
-            if name in self.seen or name.endswith(".part.npz"):
-                continue
-            self.seen.add(name)
-            stored = np.load(name)
-            target = stored["target"]
-            for k in range(len(stored["samples"])):
-                if stored["samples"][k] <= 64:
-                    self.views.append((stored[f"x{k}"], (target * stored[f"exposure{k}"]).astype(np.float32)))
-
-    def crops(self, count, side, rng):
-        planes, targets = [], []
-        for _ in range(count):
-            x, t = rng.choice(self.views)
-            height, width = x.shape[-2:]
-            y0, x0 = rng.randrange(height - side + 1) & ~1, rng.randrange(width - side + 1) & ~1
-            planes.append(x[:, y0 : y0 + side, x0 : x0 + side].astype(np.float32))
-            targets.append(t[:, y0 : y0 + side, x0 : x0 + side])
-        return torch.from_numpy(np.stack(planes)), torch.from_numpy(np.stack(targets))
+def inputs_of(stored):
+    for k, samples in enumerate(stored["samples"]):
+        if samples <= 64:
+            yield int(samples), stored[f"x{k}"], (stored["target"] * stored[f"exposure{k}"]).astype(np.float32)
 
 
 def rotation(rng):
@@ -83,12 +59,7 @@ def rotation(rng):
 
 
 def augmented(planes, target, rng):
-    if rng.random() < 0.5:
-        planes, target = planes.flip(-1), target.flip(-1)
-    if rng.random() < 0.5:
-        planes, target = planes.flip(-2), target.flip(-2)
-    if rng.random() < 0.5:
-        planes, target = planes.transpose(-1, -2), target.transpose(-1, -2)
+    planes, target = flipped(planes, target, rng)
     planes = planes.clone()
     planes[:, NORMAL] = torch.einsum("ij,bjhw->bihw", rotation(rng), planes[:, NORMAL])
     return planes, target
@@ -112,59 +83,18 @@ def validated(model, views, limit=256):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("data", nargs="+")
-    parser.add_argument("-o", "--output", required=True)
-    parser.add_argument("--validation", default="")
-    parser.add_argument("--resume", default="")
-    parser.add_argument("--seconds", type=float, default=3600)
-    parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--rate", type=float, default=2e-3)
-    parser.add_argument("--crops", type=int, default=4)
-    parser.add_argument("--side", type=int, default=96)
-    parser.add_argument("--seed", type=int, default=1)
-    o = parser.parse_args()
-    torch.set_num_threads(o.threads)
-    torch.manual_seed(o.seed)
-    rng = random.Random(o.seed)
-    model = KernelPrediction()
-    if o.resume:
-        model.load_state_dict(torch.load(o.resume)["model"])
-    mean = copy.deepcopy(model)
-    optimiser = torch.optim.Adam(model.parameters(), lr=o.rate, betas=(0.9, 0.99))
-    views = Views(o.data)
-    checks = [(n, np.load(n)) for n in sorted(glob.glob(os.path.join(o.validation, "*.npz")))] if o.validation else []
-    begun, step, losses, saved = time.time(), 0, [], time.time()
-    while time.time() - begun < o.seconds:
-        done = (time.time() - begun) / o.seconds
-        rate = o.rate * min(1, (step + 1) / 100) * (0.5 + 0.5 * math.cos(math.pi * done) + 0.01)
-        for group in optimiser.param_groups:
-            group["lr"] = rate
-        planes, target = augmented(*views.crops(o.crops, o.side, rng), rng)
+    options = training.arguments(__doc__, seconds=3600, rate=2e-3, side=96).parse_args()
+    training.begin(options)
+    model, views = KernelPrediction(), training.Views(options.data, inputs_of)
+    checks = [(n, np.load(n)) for n in sorted(glob.glob(os.path.join(options.validation, "*.npz")))] if options.validation else []
+
+    def loss_of_crops(rng):
+        planes, target = augmented(*views.crops(options.crops, options.side, rng, multiple=2), rng)
         exposure = 2 ** rng.uniform(-1, 1)
         x, irradiance, variance, divisor = unpacked(planes, exposure)
-        loss = loss_of(model(x, irradiance, variance) * divisor, target * exposure)
-        optimiser.zero_grad()
-        loss.backward()
-        norm = torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
-        if torch.isfinite(norm):
-            optimiser.step()
-        decay = min(0.998, step / (step + 20))
-        with torch.no_grad():
-            for to, of in zip(mean.parameters(), model.parameters()):
-                to += (1 - decay) * (of - to)
-        losses.append(loss.item())
-        step += 1
-        if time.time() - saved > 300 or time.time() - begun >= o.seconds:
-            saved = time.time()
-            record = {"steps": step, "seconds": round(saved - begun), "views": len(views.views),
-                      "loss": round(sum(losses[-500:]) / len(losses[-500:]), 4)}
-            if checks:
-                record["validation"] = validated(mean, checks)
-            print(json.dumps(record), flush=True)
-            torch.save({"model": mean.state_dict(), "record": record}, o.output + ".part")
-            os.replace(o.output + ".part", o.output)
-            views.refresh()
+        return loss_of(model(x, irradiance, variance) * divisor, target * exposure)
+
+    training.train(model, options, views, loss_of_crops, lambda mean: validated(mean, checks) if checks else None, {})
 
 
 if __name__ == "__main__":
