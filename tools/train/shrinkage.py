@@ -75,7 +75,7 @@ def window_mean(planes, radius):
 
 
 class Cells:
-    """Weighted means over mirrored windows whose pixels share weights in cells (combiners/learned/window_cells.h)."""
+    """Weighted means over mirrored windows whose pixels share weights in cells (combiners/learned/planes/window_cells.h)."""
 
     def __init__(self, radius, cells):
         side = 2 * radius + 1

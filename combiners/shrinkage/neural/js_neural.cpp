@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "combiners/learned/network_place.h"
-#include "combiners/learned/window_cells.h"
+#include "combiners/learned/planes/window_cells.h"
 #include "combiners/pipeline/external_method.h"
 #include "combiners/pipeline/pipeline.h"
 #include "combiners/pipeline/registry.h"

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "combiners/learned/network_place.h"
-#include "combiners/learned/window_cells.h"
+#include "combiners/learned/planes/window_cells.h"
 #include "renderer/core/error.h"
 
 namespace braid {

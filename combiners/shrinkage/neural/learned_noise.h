@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-#include "combiners/learned/plane_network.h"
+#include "combiners/learned/planes/plane_network.h"
 
 namespace braid {
 

@@ -2,8 +2,8 @@
 // Weighted means over windows, and networks that see squares of pixels, against plain loops.
 #include <doctest/doctest.h>
 
-#include "combiners/learned/plane_network.h"
-#include "combiners/learned/window_cells.h"
+#include "combiners/learned/planes/plane_network.h"
+#include "combiners/learned/planes/window_cells.h"
 #include "combiners/pixels/mirror.h"
 #include "renderer/core/error.h"
 #include "tests/combiners/learned/network_writer.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "combiners/learned/window_cells.h"
+#include "combiners/learned/planes/window_cells.h"
 
 #include <algorithm>
 #include <cmath>

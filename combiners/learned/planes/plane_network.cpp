@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "combiners/learned/plane_network.h"
+#include "combiners/learned/planes/plane_network.h"
 
 #include <algorithm>
 
