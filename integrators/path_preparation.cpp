@@ -202,7 +202,11 @@ Applies measured(const Settings& s, int asked) {
 }  // namespace
 
 Applies lightSamplesMeasured(const Plan& plan) { return measured(plan.settings, plan.settings.lightSamples); }
-Applies pathSplitsMeasured(const Plan& plan) { return measured(plan.settings, plan.settings.pathSplits); }
+Applies pathSplitsMeasured(const Plan& plan) {
+  if (plan.settings.pathSplits == 1)
+    return {false, "one direction: a combined image loses more by fewer samples (--path-splits 0: as many as pay)"};
+  return measured(plan.settings, plan.settings.pathSplits);
+}
 
 PathPreparation::PathPreparation(const TransportContext& context, const Plan& plan) {
   if (guidingApplies(plan).yes) {

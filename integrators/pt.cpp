@@ -36,7 +36,7 @@ class PathTracer final : public Integrator {
              guiding.yes && guiding.reason.empty() ? "learned before the first pass, and used where it pays"
                                                    : guiding.reason},
             {samples.yes || plan.settings.lightSamples > 0, "light samples", samples.reason},
-            {splits.yes || plan.settings.pathSplits > 0, "path splits", splits.reason}};
+            {splits.yes || plan.settings.pathSplits > 1, "path splits", splits.reason}};
   }
   WorkingMemory workingMemory(const Plan& plan) const override {
     if (!guidingApplies(plan).yes) return {};

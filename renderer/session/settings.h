@@ -36,7 +36,7 @@ struct Settings {
   LightStrategy lightStrategy = LightStrategy::Automatic;
   Guiding guiding = Guiding::Automatic;
   int lightSamples = 0;  // of a camera path of pt at its first surface that is no mirror; 0: as many as pay
-  int pathSplits = 0;    // directions that such a path goes on in from there; 0: as many as pay
+  int pathSplits = 1;    // directions that such a path goes on in from there; 0: as many as pay
   KeptBuffers keep{.features = true};
   bool transparent = false;            // camera rays that miss: no radiance, alpha 0
   std::optional<Spectrum> background;  // what camera rays that miss see instead of the environment

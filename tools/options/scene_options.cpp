@@ -177,9 +177,11 @@ void addSampleOptions(CLI::App& command, SampleChoice& c) {
   command.add_option("--light-samples", c.lightSamples, "Lights that a path of pt samples at its first surface")
       ->default_str("as many as pay")
       ->check(wholeNumber(1, kMostLightSamples));
-  command.add_option("--path-splits", c.pathSplits, "Directions that a path of pt goes on in from its first surface")
-      ->default_str("as many as pay")
-      ->check(wholeNumber(1, kMostPathSplits));
+  command
+      .add_option("--path-splits", c.pathSplits,
+                  "Directions that a path of pt goes on in from its first surface; 0: as many as pay")
+      ->capture_default_str()
+      ->check(wholeNumber(0, kMostPathSplits));
   addThreads(command, c.threads);
   command.add_option("--clamp", c.clamp, "Clamp a path's radiance (biased; 0: off)")
       ->capture_default_str()

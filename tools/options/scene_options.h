@@ -50,7 +50,7 @@ struct SampleChoice {
   LightStrategy lights = LightStrategy::Automatic;
   Guiding guiding = Guiding::Automatic;
   int lightSamples = 0;  // 0: as many as pay
-  int pathSplits = 0;    // 0: as many as pay
+  int pathSplits = 1;    // 0: as many as pay
   double seconds = 0;    // of --time, 0: none
   uint64_t spp = 0;      // 0: not said
   int maxDepth = 32;
