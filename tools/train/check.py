@@ -55,6 +55,20 @@ def check_kernels():
         assert (one - other).abs().max() < 1e-4 * (1 + one.abs().max()), "kernels.c differs from whole tensors"
 
 
+def check_resumed(folder, views, exported):
+    """A training resumed from what braid reads begins with its weights and tests."""
+    from network import KernelPrediction
+    import network_file
+
+    weights, again = (os.path.join(folder, name) for name in ("resumed.pt", "resumed.network"))
+    python("train.py", views, "--resume", exported, "-o", weights, "--seconds", "0")
+    python("export.py", weights, again)
+    models = [KernelPrediction(), KernelPrediction()]
+    constants = [network_file.read(path, model.unet)["constants"] for path, model in zip((exported, again), models)]
+    same = all((one == other).all() for one, other in zip(*(model.unet.parameters() for model in models)))
+    assert same and constants[0] == constants[1], "a resumed training begins with other weights"
+
+
 def check_image(braid, folder, weights, exported):
     """braid's image of the view against torch's."""
     import data
@@ -150,6 +164,7 @@ def main():
         first, last = validated(before, stored), validated(after, stored)
         assert sum(last.values()) < sum(first.values()), f"training did not help: {first} became {last}"
         python("export.py", weights, exported)
+        check_resumed(folder, views, exported)
         check_image(braid, folder, weights, exported)
         check_shrinkage(braid, folder)
 

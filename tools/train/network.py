@@ -97,6 +97,36 @@ class Unet(nn.Module):
         t = relu(self.dec0b(relu(self.dec0a(torch.cat([up(t), e0], 1)))))
         return self.head(torch.cat([t, packed], 1))
 
+    def layers(self):
+        """Those of the exported file, and the modules of those that have weights (network_file.py)."""
+        out, modules = [], []
+
+        def convolution(name, source, relu=True):
+            module = getattr(self, name)
+            out.append({"name": name, "kind": "convolution", "inputs": [source], "outputs": module.out_channels,
+                        "kernel": module.kernel_size[0], "relu": relu})
+            modules.append(module)
+            return name
+
+        def other(kind, name, *sources):
+            out.append({"name": name, "kind": kind, "inputs": list(sources)})
+            return name
+
+        def joined(below, beside):
+            return other("concatenate", "with_" + beside, other("upsample", "up_" + below, below), beside)
+
+        e0 = convolution("enc0b", convolution("enc0a", "input"))
+        e1 = convolution("enc1", other("pool", "pool0", e0))
+        e2 = convolution("enc2", other("pool", "pool1", e1))
+        e3 = convolution("enc3", other("pool", "pool2", e2))
+        t = convolution("enc4b", convolution("enc4a", other("pool", "pool3", e3)))
+        t = convolution("dec3", joined(t, e3))
+        t = convolution("dec2", joined(t, e2))
+        t = convolution("dec1", joined(t, e1))
+        t = convolution("dec0b", convolution("dec0a", joined(t, e0)))
+        convolution("head", other("concatenate", "with_input", t, "input"), relu=False)
+        return out, modules
+
 
 class KernelPrediction(nn.Module):
     def __init__(self):
@@ -109,6 +139,22 @@ class KernelPrediction(nn.Module):
     def tests(self):
         """Steepness at least 0.05 and tolerance between 1 and 7, in squared standard deviations: never switched off."""
         return 0.05 + functional.softplus(self.steepness - 0.5), 1 + 6 * torch.sigmoid(self.tolerance - 1)
+
+    def constants(self):
+        """The tests, as the exported file names them."""
+        steepness, tolerance = (t.detach().tolist() for t in self.tests())
+        rounded = lambda values: [round(v, 6) for v in values]
+        return {"steepness": rounded(steepness[0]), "tolerance": rounded(tolerance[0]),
+                "gateSteepness": rounded(steepness[1]), "gateTolerance": rounded(tolerance[1])}
+
+    def take_constants(self, constants):
+        """What constants() gave: the tests are those again."""
+        both = lambda of, gates: torch.tensor([constants[of], constants[gates]], dtype=torch.float32)
+        steepness = (both("steepness", "gateSteepness") - 0.05).clamp(min=1e-6)
+        tolerance = ((both("tolerance", "gateTolerance") - 1) / 6).clamp(1e-6, 1 - 1e-6)
+        with torch.no_grad():
+            self.steepness.copy_(0.5 + torch.log(torch.expm1(steepness)))
+            self.tolerance.copy_(1 + torch.logit(tolerance))
 
     def forward(self, planes, irradiance, variance):
         out = self.unet(planes)

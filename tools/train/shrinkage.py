@@ -39,7 +39,7 @@ class Unet(nn.Module):
         return functional.pixel_shuffle(self.head(t), self.pack)
 
     def layers(self):
-        """Those of the exported file, and the modules of those that have weights (export.py)."""
+        """Those of the exported file, and the modules of those that have weights (network_file.py)."""
         out, modules = [], []
 
         def convolutions(source, *names):

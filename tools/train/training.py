@@ -13,6 +13,8 @@ import time
 import numpy as np
 import torch
 
+import network_file
+
 SAVED_EVERY = 300  # seconds
 FIRST_STEPS = 30  # in which the rate rises
 
@@ -94,6 +96,16 @@ class Averaged:
         self.steps += 1
 
 
+def resume(model, path):
+    """Weights of a training, or of a network that braid reads."""
+    if not path.endswith(".network"):
+        model.load_state_dict(torch.load(path)["model"])
+        return
+    constants = network_file.read(path, model.unet)["constants"]
+    if constants:
+        model.take_constants(constants)
+
+
 def train(model, options, views, loss_of_crops, validation, kept):
     """Trains for options.seconds and saves every few minutes; with 0 seconds only the weights of the start.
 
@@ -101,7 +113,7 @@ def train(model, options, views, loss_of_crops, validation, kept):
     `kept` what else belongs into the file of weights.
     """
     if options.resume:
-        model.load_state_dict(torch.load(options.resume)["model"])
+        resume(model, options.resume)
     averaged, rng = Averaged(model, options.rate), random.Random(options.seed)
     begun, saved, losses = time.time(), time.time(), [0.0]
     while True:
