@@ -5,6 +5,7 @@
 
 #include "renderer/core/parallel.h"
 #include "renderer/core/plane.h"
+#include "renderer/core/image_values.h"
 
 namespace braid {
 
@@ -63,10 +64,7 @@ Spectrum Environment::texel(int x, int y) const {
     return channels >= 3 ? Spectrum(p[0], p[1], p[2]) : Spectrum(p[0]);
   }
   const uint8_t* p = &image_->bytes[i];
-  const auto decode = [](uint8_t b) {
-    const float v = static_cast<float>(b) / 255.0f;
-    return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f);
-  };
+  const auto decode = [](uint8_t b) { return decodeSrgb(static_cast<float>(b) / 255.0f); };
   return channels >= 3 ? Spectrum(decode(p[0]), decode(p[1]), decode(p[2])) : Spectrum(decode(p[0]));
 }
 

@@ -9,7 +9,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/film/files/exr.h"
-#include "renderer/film/files/srgb.h"
+#include "renderer/core/image_values.h"
 #include "tests/film/exr_files.h"
 
 namespace braid::test_exr_reading {

@@ -6,7 +6,7 @@
 
 #include "renderer/film/files/exr.h"
 #include "renderer/film/files/picture.h"
-#include "renderer/film/files/srgb.h"
+#include "renderer/core/image_values.h"
 #include "tests/support/command_line.h"
 
 namespace braid::test_tone {

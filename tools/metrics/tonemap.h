@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "renderer/core/plane.h"
-#include "renderer/film/files/srgb.h"
+#include "renderer/core/image_values.h"
 
 namespace braid {
 

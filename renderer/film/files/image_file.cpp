@@ -9,11 +9,10 @@
 #include <vector>
 
 #include "renderer/core/error.h"
-#include "renderer/core/image_limits.h"
+#include "renderer/core/image_values.h"
 #include "renderer/core/parallel.h"
 #include "renderer/core/plane.h"
 #include "renderer/film/files/exr.h"
-#include "renderer/film/files/srgb.h"
 #include "renderer/images/image_codecs.h"
 
 namespace braid {

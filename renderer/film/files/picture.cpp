@@ -8,7 +8,7 @@
 #include "renderer/core/error.h"
 #include "renderer/core/parallel.h"
 #include "renderer/film/files/output_file.h"
-#include "renderer/film/files/srgb.h"
+#include "renderer/core/image_values.h"
 #include "renderer/film/make_attribute.h"
 #include "renderer/images/image_codecs.h"
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "renderer/film/files/srgb.h"
+#include "renderer/core/image_values.h"
 
 namespace braid {
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "renderer/core/parallel.h"
+#include "renderer/core/image_values.h"
 
 namespace braid {
 
@@ -15,12 +16,10 @@ constexpr int kIrradianceWidth = 128;
 constexpr int kMostProbes = 4;    // of a pixel, on each axis
 constexpr int kMostOfEdge = 256;  // places at which an edge is compared
 
-float fromSrgb(float v) { return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f); }
-
 const std::array<float, 256>& srgbTable() {
   static const std::array<float, 256> table = [] {
     std::array<float, 256> t{};
-    for (size_t i = 0; i < t.size(); ++i) t[i] = fromSrgb(static_cast<float>(i) / 255.0f);
+    for (size_t i = 0; i < t.size(); ++i) t[i] = decodeSrgb(static_cast<float>(i) / 255.0f);
     return t;
   }();
   return table;
@@ -90,7 +89,7 @@ class CubeMap {
     for (size_t c = 0; c < 3; ++c) {
       const size_t k = i + (channels >= 3 ? c : 0);
       colour[static_cast<int>(c)] = face.floats.empty()  ? srgbTable()[face.bytes[k]]
-                                    : face.integerFloats ? fromSrgb(face.floats[k])
+                                    : face.integerFloats ? decodeSrgb(face.floats[k])
                                                          : face.floats[k];
     }
     if (!face.hasAlpha()) return colour;

@@ -9,7 +9,7 @@
 
 #include "renderer/film/files/exr.h"
 #include "renderer/film/files/picture.h"
-#include "renderer/film/files/srgb.h"
+#include "renderer/core/image_values.h"
 #include "renderer/film/files/state_file.h"
 #include "tests/support/running_braid.h"
 #include "tools/options/file_uses.h"

@@ -5,7 +5,7 @@
 #include <array>
 #include <string_view>
 
-#include "renderer/core/image_limits.h"
+#include "renderer/core/image_values.h"
 #include "renderer/core/parallel.h"
 #include "renderer/scene/data/ktx2/etc1s.h"
 #include "renderer/scene/data/ktx2/plain.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "renderer/core/error.h"
-#include "renderer/core/image_limits.h"
+#include "renderer/core/image_values.h"
 
 namespace braid {
 

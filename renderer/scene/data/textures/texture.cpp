@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "renderer/core/error.h"
+#include "renderer/core/image_values.h"
 #include "renderer/images/image_codecs.h"
 #include "renderer/scene/data/textures/image_checks.h"
 #include "renderer/scene/data/textures/ktx2_image.h"
@@ -19,14 +20,12 @@ namespace braid {
 
 namespace {
 
-float srgbToLinear(float v) { return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f); }
-
 struct ByteTables {
   std::array<float, 256> linear, srgb;
   ByteTables() {
     for (size_t i = 0; i < 256; ++i) {
       linear[i] = static_cast<float>(i) / 255.0f;
-      srgb[i] = srgbToLinear(linear[i]);
+      srgb[i] = decodeSrgb(linear[i]);
     }
   }
 };
@@ -42,7 +41,7 @@ std::shared_ptr<const Image> decodedFromSrgb(const Image& image) {
   const auto channels = static_cast<size_t>(image.channels);
   for (size_t i = 0; i < copy->floats.size(); ++i) {
     const bool isAlpha = image.hasAlpha() && i % channels == channels - 1;
-    if (!isAlpha) copy->floats[i] = srgbToLinear(copy->floats[i]);
+    if (!isAlpha) copy->floats[i] = decodeSrgb(copy->floats[i]);
   }
   copy->integerFloats = false;
   return copy;
