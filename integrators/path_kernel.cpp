@@ -284,7 +284,18 @@ bool PathKernel::shade(int p, size_t ray) {
     if (material.emissive) addEmission(path, hit, sample);
     sample.onGround = sample.onGround || (material.ground && path.fromCamera());
   }
-  splitColours(context_, path.media, hit, path.channel, path.throughput);
+  if (!coloursPart(context_, path.media, hit, path.channel)) return shadeSurface(p, ray);
+  if (!recorder_) return shadeColours(p, ray);
+  followOne(path.channel.index, 3, path.channel, path.throughput);
+  return shadeSurface(p, ray);
+}
+
+// What scatters at the hit of a ray: features, light samples, and the direction in which the path goes on.
+bool PathKernel::shadeSurface(int p, size_t ray) {
+  const Hit& hit = hit_[ray];
+  PathState& path = path_[static_cast<size_t>(p)];
+  PathSample& sample = sample_[static_cast<size_t>(path.sample)];
+  const MaterialSummary& material = context_.summaryOf(hit);
   const uint32_t lobes = material.lobes;
   const Vec3 wo = hit.frame.toLocal(hit.wo);
   const Bsdf bsdf = lobes == kLobeDiffuse ? Bsdf(baseColorAt(scene_, hit), wo)

@@ -53,6 +53,9 @@ inline uint64_t branchPass(uint64_t pass, uint64_t k, uint64_t n) {
   return (pass / kSequenceBuckets * n + k) * kSequenceBuckets + pass % kSequenceBuckets;
 }
 
+// How many paths go on from the first surface whose refraction depends on colour.
+inline int coloursOf(const Scene& scene) { return scene.traits().has(kTraitDispersion) ? 3 : 1; }
+
 // Sees the steps of a path, for replay; of a path that is split, those of its branches in turn.
 class PathObserver {
  public:
@@ -81,7 +84,7 @@ class PathKernel {
         filtered_(context.scene.accel().filtered()),
         walk_(context.scene, sampler),
         cameraMedia_(mediaOfCamera(context.scene, plan.camera)),
-        path_(kBatch),
+        path_(static_cast<size_t>(kBatch * coloursOf(scene_))),
         sample_(kBatch),
         shadowRays_(context) {}
 
@@ -113,6 +116,8 @@ class PathKernel {
   int lightSamplesOf(const PathState& path) const { return path.bounces == 0 ? aids_.lightSamples : 1; }
   // One step of a path from the hit of a ray; true when it goes on. Shadow rays are appended.
   bool shade(int p, size_t ray);
+  bool shadeSurface(int p, size_t ray);
+  bool shadeColours(int p, size_t ray);
   void addEnvironment(const PathState& path, PathSample& sample) const;
   void addEmission(const PathState& path, const Hit& hit, PathSample& sample) const;
   void addUnlit(PathState& path, const Hit& hit, PathSample& sample) const;
@@ -146,7 +151,7 @@ class PathKernel {
   MediaStack cameraMedia_;  // the solids that the camera is inside of
 
   int count_ = 0;
-  // Those of the camera come first, then the branches that go on from a split.
+  // Those of the camera come first, then those that go on from a split and in other colours.
   std::vector<PathState> path_;
   std::vector<PathSample> sample_;  // branch k of path i adds to one of its own, so that sums have one order
   std::array<bool, kBatch> isSplit_;

@@ -98,10 +98,10 @@ void PathKernel::sampleLights(int p, size_t ray, const GuidedBsdf& bsdf, bool fo
 
 void PathKernel::use(const PathAids& aids) {
   aids_ = aids;
-  const auto places = static_cast<size_t>(kBatch * aids.splits);
-  if (aids.splits > 1 && path_.size() < places) {
-    path_.resize(places);
-    sample_.resize(kBatch + places);
+  const auto branches = static_cast<size_t>(kBatch * aids.splits);
+  if (aids.splits > 1 && sample_.size() < kBatch + branches) {
+    path_.resize(branches * static_cast<size_t>(coloursOf(scene_)));
+    sample_.resize(kBatch + branches);
   }
 }
 
@@ -111,6 +111,7 @@ void PathKernel::use(const PathAids& aids) {
 bool PathKernel::split(int p, const Hit& hit, const GuidedBsdf& bsdf, bool twoSided) {
   PathState& path = path_[static_cast<size_t>(p)];
   const auto first = static_cast<size_t>(kBatch + path.sample * aids_.splits);
+  const bool isFirstColour = !isSplit_[static_cast<size_t>(path.sample)];
   isSplit_[static_cast<size_t>(path.sample)] = true;
   const float share = 1 / static_cast<float>(aids_.splits);
   path.throughput *= share;
@@ -123,7 +124,7 @@ bool PathKernel::split(int p, const Hit& hit, const GuidedBsdf& bsdf, bool twoSi
     PathState& branch = path_[static_cast<size_t>(place)];
     branch = whole;
     branch.sample = static_cast<int>(first) + k;
-    std::construct_at(&sample_[first + static_cast<size_t>(k)]);
+    if (isFirstColour) std::construct_at(&sample_[first + static_cast<size_t>(k)]);
     branch.key = hashCombine(whole.key, kBranchKey + static_cast<uint64_t>(k));
     if (aids_.branches.empty()) {
       branch.pointsKey = branch.key;
@@ -136,6 +137,25 @@ bool PathKernel::split(int p, const Hit& hit, const GuidedBsdf& bsdf, bool twoSi
     if (!goesOn) continue;
     free_.pop_back();
     waiting_.push_back(place);
+  }
+  return false;
+}
+
+// The path goes on once in each colour, all with the same points. They add to one sample, each to a channel of its own,
+// and the one that is drawn finds the features. Those that go on wait for room in the batch; true when the last of
+// them, which takes the path's place, goes on.
+bool PathKernel::shadeColours(int p, size_t ray) {
+  const PathState whole = path_[static_cast<size_t>(p)];
+  for (uint8_t colour = 0; colour < 3; ++colour) {
+    const int place = colour == 2 ? p : free_.back();
+    PathState& path = path_[static_cast<size_t>(place)];
+    path = whole;
+    path.featuresDone = whole.featuresDone || colour != whole.channel.index;
+    followOne(colour, 1, path.channel, path.throughput);
+    if (colour < 2) free_.pop_back();
+    const bool goesOn = shadeSurface(place, ray);
+    if (colour == 2) return goesOn;
+    (goesOn ? waiting_ : free_).push_back(place);
   }
   return false;
 }

@@ -212,7 +212,7 @@ void GradientKernel::pairEmission(BasePath& base) {
 void GradientKernel::fold(Walker& walker, const Walker& at) const {
   walker.prefix *= walker.path.throughput;
   walker.path.throughput = Spectrum(1);
-  if (at.arrival == Arrival::Surface) splitColours(context_, at.path.media, at.hit, walker.path.channel, walker.prefix);
+  if (at.arrival == Arrival::Surface) drawColour(context_, at.path.media, at.hit, walker.path.channel, walker.prefix);
 }
 
 void GradientKernel::shadeBases() {

@@ -53,7 +53,8 @@ void planSceneParts(const Scene& scene, const Settings& settings, Plan& plan) {
   part(kTraitVolume, "media tracking", "closed solids refract or attenuate", "no solid with a volume");
   part(kTraitScattering, "volume scattering", "paths walk through closed solids; nothing connects to their events",
        "no solid scatters light within");
-  part(kTraitDispersion, "dispersion", "paths follow one colour from the first dispersive surface on",
+  part(kTraitDispersion, "dispersion",
+       "from the first dispersive surface on, paths go on once a colour (pt, crn) or in one",
        "no solid disperses light");
   part(kTraitInstances, "instance transforms",
        scene.moves() ? "meshes placed several times, or moved" : "meshes placed several times",

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Dispersion (KHR_materials_dispersion). Every path has a colour channel of its own, drawn with probability 1/3. It
-// follows that one alone, with three times the weight, from the first surface on whose refraction depends on colour,
-// with the channel's index there and beyond; until then it carries all three. Paths that are joined have channels of
-// their own: what they carry together is 0 where these differ, and right on average.
+// Dispersion (KHR_materials_dispersion). A path carries all three colour channels up to the first surface whose
+// refraction depends on colour, and one from there on, with the channel's index. Camera paths that nothing is joined to
+// go on once for every channel. All others follow one that is drawn with probability 1/3, with three times the weight:
+// of paths that are joined each has a channel of its own; what they carry together is 0 where these differ, and right
+// on average.
 #pragma once
 
 #include "renderer/core/sampler.h"
@@ -27,14 +28,23 @@ inline bool disperses(const TransportContext& context, const MediaStack& media, 
   return around >= 0 && materials[static_cast<size_t>(around)].disperses();
 }
 
-// At a surface that the path has come to, before its BSDF.
-inline void splitColours(const TransportContext& context, const MediaStack& media, const Hit& hit, PathChannel& channel,
-                         Spectrum& throughput) {
-  if (channel.index >= 3 || channel.split || !disperses(context, media, hit)) return;
-  channel.split = true;
+// Whether a path that carries all channels up to this surface carries one from here on.
+inline bool coloursPart(const TransportContext& context, const MediaStack& media, const Hit& hit, PathChannel channel) {
+  return channel.index < 3 && !channel.split && disperses(context, media, hit);
+}
+
+// From here on one channel alone, with so many times the weight.
+inline void followOne(uint8_t index, float weight, PathChannel& channel, Spectrum& throughput) {
+  channel = {index, true};
   Spectrum alone(0);
-  alone[channel.index] = 3 * throughput[channel.index];
+  alone[index] = weight * throughput[index];
   throughput = alone;
+}
+
+// At a surface that the path has come to, before its BSDF: from there on it follows the channel drawn.
+inline void drawColour(const TransportContext& context, const MediaStack& media, const Hit& hit, PathChannel& channel,
+                       Spectrum& throughput) {
+  if (coloursPart(context, media, hit, channel)) followOne(channel.index, 3, channel, throughput);
 }
 
 // surfaceAt() with the indices of the path's channel.

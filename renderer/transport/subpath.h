@@ -224,7 +224,7 @@ void SubpathBatch::run(const OnHit& onHit, const OnMiss& onMiss) {
       if (arrival == Arrival::Vertex) {
         const uint32_t lobes = context_.summaryOf(hit).lobes;
         const Vec3 wo = hit.frame.toLocal(hit.wo);
-        splitColours(context_, state.media, hit, state.channel, state.throughput);
+        drawColour(context_, state.media, hit, state.channel, state.throughput);
         SubpathVertex vertex =
             lobes == kLobeDiffuse
                 ? SubpathVertex(baseColorAt(scene_, hit), wo)

@@ -166,6 +166,39 @@ TEST_CASE("dispersion: in a white furnace dispersive glass cannot be seen") {
   }
 }
 
+// A path in one colour, with three times its weight, would leave two channels of three without light.
+TEST_CASE("dispersion: camera paths of pt and crn go on in every colour") {
+  const Scene scene(dispersiveSphere(0));
+  for (const char* integrator : {"pt", "crn"}) {
+    Settings settings = settingsFor(16, 16, 1);
+    settings.integrators = {integrator};
+    settings.maxDepth = 200;
+    const RenderResult r = render(scene, settings);
+    for (size_t c = 0; c < 3; ++c)
+      for (const float value : estimateOf(r).mean[c].data) CHECK(value == doctest::Approx(1).epsilon(1e-3));
+  }
+}
+
+// False alarm: 12 means within 4 standard errors, 8e-4.
+TEST_CASE("dispersion: colours and splits of one path add up to its light") {
+  const Scene scene(glassBox(10));
+  Settings settings = settingsFor(16, 16, 256, SamplerKind::Independent);
+  settings.pathSplits = 1;
+  const RenderResult one = render(scene, settings);
+  settings.pathSplits = 3;
+  settings.seed = 77;
+  const RenderResult three = render(scene, settings);
+  for (const PixelWindow& block : blocksOf(one, 8))
+    for (size_t c = 0; c < 3; ++c) {
+      CHECK(std::fabs(zScore(meanOver(one, c, block), meanOver(three, c, block))) < kSigmas);
+    }
+  settings.spp = 4;
+  settings.threads = 1;
+  const RenderResult alone = render(scene, settings);
+  settings.threads = 5;
+  CHECK(sameBits(estimateOf(alone), estimateOf(render(scene, settings))));
+}
+
 // Student's t of 15 degrees of freedom and more exceeds 7.5 once in 500,000: over 27 means and 5 integrators a false
 // alarm in 3,000 choices of seeds. Photons and merging blur: 3 % are forgiven there.
 TEST_CASE("dispersion: all integrators see the same colours through glass") {
