@@ -7,7 +7,8 @@
 //   4. shrink x towards every filter (shrinkage.h): filters and shrunk images are the candidates;
 //   5. combine them by errors measured across halves at several scales (scale_weights.h);
 //   6. refilter the result, where halves show its use (refilter.h);
-//   7. estimate the error (half_statistics.h), with the squared bias that the photon maps leave.
+//   7. give it the light back that filters have lost (lost_light.h);
+//   8. estimate the error (half_statistics.h), with the squared bias that the photon maps leave.
 // x itself is no candidate: halves cannot see the error of a firefly in the half that holds it.
 #include <algorithm>
 #include <array>
@@ -23,6 +24,7 @@
 #include "combiners/pipeline/registry.h"
 #include "combiners/ensemble/scale_weights.h"
 #include "combiners/auto/auto_filters.h"
+#include "combiners/auto/lost_light.h"
 #include "combiners/auto/refilter.h"
 #include "combiners/shrinkage/shrinkage.h"
 #include "combiners/statistics/local_range_clamp.h"
@@ -37,6 +39,7 @@ const OptionInfo kDebias{"auto-debias", 1, "0: photon maps are not corrected by 
 const OptionInfo kShrink{"auto-shrink", 1, "0: bases only, without James-Stein shrinkage towards them"};
 const OptionInfo kRefilter{"auto-refilter", 1, "0: the combined image is not filtered once more"};
 const OptionInfo kDirectIndirect{"auto-direct-indirect", 1, "0: direct and indirect light are filtered together"};
+const OptionInfo kLostLight{"auto-lost-light", 1, "0: light that filters have lost is not given back"};
 const OptionInfo kFireflies{"auto-remove-fireflies", 1, "0: keep fireflies"};
 
 // What images from filters of direct and indirect light keep of the squared bias that their halves show
@@ -70,7 +73,7 @@ class Auto : public Method {
   }
   MethodMemory memory(const MemoryCase& of) const override;
   std::vector<OptionInfo> options() const override {
-    return {kFuse, kDebias, kDirectIndirect, kShrink, kFireflies, kRefilter};
+    return {kFuse, kDebias, kDirectIndirect, kShrink, kFireflies, kRefilter, kLostLight};
   }
   MethodResult run(const MethodInputs& in) const override;
 };
@@ -140,10 +143,10 @@ void keepInRange(Estimate& base, const Estimate& x) {
                     x.mean, x.variance, kNamedRange);
 }
 
-// The image of a result filtered once more, as far as the halves of x ask for it. Its planes are the weights so far.
-void filterAgain(const Estimate& x, const MethodInputs& in, MethodResult& result) {
-  const Estimate first = std::move(result.image), second = refilter(first, in.features, passesOf(x), in.cancel);
-  if (in.cancelled()) return;
+// A result becomes another image as far as the halves of x ask for it. Its planes are the weights so far.
+void chooseBetween(const Estimate& x, const Estimate& second, const char* name, const MethodInputs& in,
+                   MethodResult& result) {
+  const Estimate first = std::move(result.image);
   const std::vector<const Estimate*> both = {&second, &first};
   const WeightMaps shares = scaleWeights(x, both, in.features);
   result.image = weightedEstimate(shares, both);
@@ -151,7 +154,7 @@ void filterAgain(const Estimate& x, const MethodInputs& in, MethodResult& result
     parallelChunks(map.plane.size(), kPixelChunk, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) map.plane[i] *= shares.of(1, 0)[i];
     });
-  result.aovs.push_back({"weight.auto.second-pass", shares.of(0, 0)});
+  result.aovs.push_back({std::string("weight.auto.") + name, shares.of(0, 0)});
 }
 
 void addTo(Plane<float>& sum, const Plane<float>& other) {
@@ -183,6 +186,7 @@ class AutoRun {
   void shrink();
   void combine();
   void refilterCombined();
+  void giveLostLight();
   void estimateError();
 
   bool isOn(const OptionInfo& option) const { return in_.options.number(option) != 0; }
@@ -198,6 +202,7 @@ class AutoRun {
   FusedEstimate fused_;
   std::vector<const Estimate*> others_;  // images of other denoisers, and photon maps that are not fused
   double biasKept_ = 1;
+  std::vector<PixelValues> removed_;  // the fireflies of x as they were
   std::vector<Estimate> filters_, shrunk_;
   MethodResult result_;
 };
@@ -219,6 +224,7 @@ MethodResult AutoRun::run() {
   shrink();
   if (!in_.cancelled()) combine();
   if (!in_.cancelled()) refilterCombined();
+  if (!in_.cancelled()) giveLostLight();
   if (!in_.cancelled() && !in_.firstPass) estimateError();  // halves that were made tell nothing
   return std::move(result_);
 }
@@ -256,9 +262,7 @@ void AutoRun::removeFireflies() {
   result_.remarks.push_back(wholeAttribute("removedFireflies", fireflies.size()));
   if (fireflies.empty()) return;
   if (!fused_.noise.empty()) replaceVariances(fused_.noise, fireflies);
-  Estimate& x = changeableX();
-  for (Rgb<float>* image : {&x.mean, &x.half[0], &x.half[1]}) replaceValues(*image, fireflies);
-  replaceVariances(x.variance, fireflies);
+  removed_ = removePixels(changeableX(), fireflies);
 }
 
 // Images of other denoisers go first: the last filter is the careful one, whose image guides the weights.
@@ -294,7 +298,17 @@ void AutoRun::combine() {
 }
 
 void AutoRun::refilterCombined() {
-  if (isOn(kRefilter)) filterAgain(*x_, in_, result_);
+  if (!isOn(kRefilter)) return;
+  const Estimate second = refilter(result_.image, in_.features, passesOf(*x_), in_.cancel);
+  if (!in_.cancelled()) chooseBetween(*x_, second, "second-pass", in_, result_);
+}
+
+void AutoRun::giveLostLight() {
+  if (isFused_ || in_.firstPass || !isOn(kLostLight)) return;
+  if (!removed_.empty()) swapPixels(changeableX(), removed_);
+  const std::optional<Estimate> brighter = withLostLight(result_.image, *x_, in_.features);
+  if (brighter) chooseBetween(*x_, *brighter, "lost-light", in_, result_);
+  if (!removed_.empty()) swapPixels(changeableX(), removed_);
 }
 
 void AutoRun::estimateError() {

@@ -7,6 +7,7 @@
 
 #include "combiners/pixels/channel_mean.h"
 #include "combiners/statistics/half_statistics.h"
+#include "combiners/pixels/likeness.h"
 #include "combiners/pixels/mirror.h"
 
 namespace braid {
@@ -15,19 +16,11 @@ namespace {
 
 constexpr int kDeviationRadius = 7, kNeighbourRadius = 2;
 constexpr double kDeviationRatio = 8, kSameSurface = 1.5, kQuarterShare = 0.3;
-constexpr double kAlbedoDeviation = 0.25, kNormalDeviation = 0.15;
+constexpr int kCommonRadius = 20;
+constexpr double kCommon = 12, kLike = 0.4;  // combiners/EXPERIMENTS.md, Fireflies that are the light
 
 double brightness(const Rgb<float>& image, size_t i) {
   return (static_cast<double>(image[0][i]) + static_cast<double>(image[1][i]) + static_cast<double>(image[2][i])) / 3;
-}
-
-double squaredDistance(const Rgb<float>& image, size_t i, size_t j) {
-  double sum = 0;
-  for (size_t c = 0; c < 3; ++c) {
-    const double d = static_cast<double>(image[c][i]) - static_cast<double>(image[c][j]);
-    sum += d * d;
-  }
-  return sum;
 }
 
 // Pixels whose deviation stands out of their surroundings.
@@ -75,7 +68,8 @@ class DarkHalf {
 };
 
 struct Neighbours {
-  double weight = 0, brightest = 0;
+  double weight = 0, most = 0, brightest = 0;  // most: what the weight would be if all were alike
+  double likeness() const { return weight / most; }
   std::array<double, 3> mean{}, variance{};
 };
 
@@ -87,13 +81,11 @@ Neighbours neighboursOf(const Rgb<float>& image, const Rgb<float>& variance, con
     for (int u = std::max(0, x - kNeighbourRadius); u <= std::min(image.width() - 1, x + kNeighbourRadius); ++u) {
       const size_t other = image[0].index(u, v);
       if (candidate[other]) continue;
-      double unlike = 0;
-      if (features)
-        unlike = squaredDistance(features->albedo.mean, at, other) / (2 * kAlbedoDeviation * kAlbedoDeviation) +
-                 squaredDistance(features->normal.mean, at, other) / (2 * kNormalDeviation * kNormalDeviation);
+      const double unlike = features ? unlikeness(*features, at, other) : 0;
       if (unlike < kSameSurface) n.brightest = std::max(n.brightest, brightness(image, other));
       const double distance = static_cast<double>((u - x) * (u - x) + (v - y) * (v - y));
-      const double w = std::exp(-unlike - distance / 8);
+      const double nearness = std::exp(-distance / 8), w = std::exp(-unlike) * nearness;
+      n.most += nearness;
       n.weight += w;
       for (size_t c = 0; c < 3; ++c) {
         n.mean[c] += w * static_cast<double>(image[c][other]);
@@ -107,6 +99,25 @@ Neighbours neighboursOf(const Rgb<float>& image, const Rgb<float>& variance, con
   return n;
 }
 
+// Keeps of every firefly with like neighbours 1 - kCommon / K, where K fireflies of the same light, or as many as their
+// light amounts to, lie in the window about it. `excess`: what these are brighter than their neighbours, 0 elsewhere.
+void keepCommon(const Plane<float>& excess, std::vector<Firefly>& fireflies) {
+  Plane<float> squares = excess;
+  for (float& e : squares.data) e *= e;
+  const Plane<float> mean = mirrorBoxMean<float>(excess, kCommonRadius);
+  const Plane<float> meanSquare = mirrorBoxMean<float>(squares, kCommonRadius);
+  constexpr double kPixels = (2 * kCommonRadius + 1) * (2 * kCommonRadius + 1);
+  for (Firefly& s : fireflies) {
+    if (!(excess[s.index] > 0)) continue;
+    const double sum = kPixels * static_cast<double>(mean[s.index]);
+    const double sumOfSquares = kPixels * static_cast<double>(meanSquare[s.index]);
+    s.kept = static_cast<float>(std::max(0.0, 1 - kCommon * sumOfSquares / (sum * sum)));
+  }
+}
+
+// Also where the value is infinite.
+float drawn(float value, float to, float kept) { return kept > 0 ? to + kept * (value - to) : to; }
+
 }  // namespace
 
 std::vector<Firefly> findFireflies(const Estimate& estimate, const GivenQuarters& quarters, const Features* features) {
@@ -115,6 +126,7 @@ std::vector<Firefly> findFireflies(const Estimate& estimate, const GivenQuarters
   std::vector<Firefly> fireflies;
   if (!darkHalf.known()) return fireflies;
   const std::vector<char> candidate = candidates(variance);
+  Plane<float> excess(image.width(), image.height(), 0.0f);
   for (int y = 0; y < image.height(); ++y)
     for (int x = 0; x < image.width(); ++x) {
       const size_t i = image[0].index(x, y);
@@ -127,12 +139,14 @@ std::vector<Firefly> findFireflies(const Estimate& estimate, const GivenQuarters
       if (value <= mean) continue;
       if (darkHalf.at(i) - mean >= kQuarterShare * (value - mean)) continue;
       Firefly firefly{i};
+      if (features && n.likeness() > kLike) excess[i] = finiteFloat(value - mean);
       for (int c = 0; c < 3; ++c) {
         firefly.value[c] = finiteFloat(n.mean[static_cast<size_t>(c)]);
         firefly.variance[c] = finiteFloat(n.variance[static_cast<size_t>(c)]);
       }
       fireflies.push_back(firefly);
     }
+  keepCommon(excess, fireflies);
   return fireflies;
 }
 
@@ -145,14 +159,42 @@ Estimate withoutFireflies(const Estimate& estimate, const GivenQuarters& quarter
   return out;
 }
 
+std::vector<PixelValues> removePixels(Estimate& estimate, const std::vector<Firefly>& fireflies) {
+  std::vector<PixelValues> before;
+  for (const Firefly& s : fireflies) {
+    PixelValues& pixel = before.emplace_back();
+    pixel.index = s.index;
+    for (int c = 0; c < 3; ++c) {
+      const auto channel = static_cast<size_t>(c);
+      pixel.mean[c] = estimate.mean[channel][s.index];
+      pixel.variance[c] = estimate.variance[channel][s.index];
+      for (size_t h = 0; h < 2; ++h) pixel.half[h][c] = estimate.half[h][channel][s.index];
+    }
+  }
+  for (Rgb<float>* image : {&estimate.mean, &estimate.half[0], &estimate.half[1]}) replaceValues(*image, fireflies);
+  replaceVariances(estimate.variance, fireflies);
+  return before;
+}
+
+void swapPixels(Estimate& estimate, std::vector<PixelValues>& pixels) {
+  for (PixelValues& pixel : pixels)
+    for (int c = 0; c < 3; ++c) {
+      const auto channel = static_cast<size_t>(c);
+      std::swap(pixel.mean[c], estimate.mean[channel][pixel.index]);
+      std::swap(pixel.variance[c], estimate.variance[channel][pixel.index]);
+      for (size_t h = 0; h < 2; ++h) std::swap(pixel.half[h][c], estimate.half[h][channel][pixel.index]);
+    }
+}
+
 void replaceValues(Rgb<float>& image, const std::vector<Firefly>& fireflies) {
   for (const Firefly& s : fireflies)
-    for (size_t c = 0; c < 3; ++c) image[c][s.index] = s.value[static_cast<int>(c)];
+    for (size_t c = 0; c < 3; ++c) image[c][s.index] = drawn(image[c][s.index], s.value[static_cast<int>(c)], s.kept);
 }
 
 void replaceVariances(Rgb<float>& variance, const std::vector<Firefly>& fireflies) {
   for (const Firefly& s : fireflies)
-    for (size_t c = 0; c < 3; ++c) variance[c][s.index] = s.variance[static_cast<int>(c)];
+    for (size_t c = 0; c < 3; ++c)
+      variance[c][s.index] = drawn(variance[c][s.index], s.variance[static_cast<int>(c)], s.kept);
 }
 
 }  // namespace braid

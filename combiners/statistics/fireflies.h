@@ -9,10 +9,11 @@
 
 namespace braid {
 
-// A pixel that is replaced, and by what.
+// A pixel that is drawn to other values, and how much of its difference to them it keeps.
 struct Firefly {
   size_t index = 0;
   Spectrum value{0}, variance{0};
+  float kept = 0;
 };
 
 // The fireflies of an unbiased image, before filters spread them over their neighbours (combiners/README.md,
@@ -23,12 +24,25 @@ struct Firefly {
 //   - its two darkest quarters, or without quarters its darker half, show less than 0.3 of the excess over the
 //     neighbours' mean: a firefly lives in one or two quarters, a thin lamp in all four.
 // Value and variance are replaced by the means of those neighbours, weighted by nearness and by likeness in albedo and
-// normal. The third condition makes fireflies vanish as samples grow: what is there shows in every quarter. With
-// neither quarters nor halves there are no fireflies. The estimate has a variance; the features may be null.
+// normal. The third condition makes fireflies vanish as samples grow: what is there shows in every quarter. Where many
+// share a neighbourhood they are its light: those with features like their neighbours' keep max(0, 1 - 12 / K) of what
+// they exceed these by, with K = (sum e)² / sum e² of the excesses e in 41x41 pixels, the number of like fireflies.
+// With neither quarters nor halves there are none. The estimate has a variance; the features may be null.
 std::vector<Firefly> findFireflies(const Estimate& estimate, const GivenQuarters& quarters, const Features* features);
 
 // What denoisers read of the estimate, its mean, halves and variance, with the fireflies replaced.
 Estimate withoutFireflies(const Estimate& estimate, const GivenQuarters& quarters, const Features* features);
+
+// What an estimate holds of a pixel.
+struct PixelValues {
+  size_t index = 0;
+  Spectrum mean{0}, half[2] = {Spectrum(0), Spectrum(0)}, variance{0};
+};
+
+// Replaces the fireflies of an estimate with halves; returns what was there.
+std::vector<PixelValues> removePixels(Estimate& estimate, const std::vector<Firefly>& fireflies);
+// Exchanges pixels of an estimate with halves and these, so that a second call takes the first one back.
+void swapPixels(Estimate& estimate, std::vector<PixelValues>& pixels);
 
 // Writes the replacements into an image or into a variance.
 void replaceValues(Rgb<float>& image, const std::vector<Firefly>& fireflies);

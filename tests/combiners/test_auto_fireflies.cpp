@@ -91,6 +91,45 @@ TEST_CASE("Without quarters the halves tell fireflies, and without halves nothin
   CHECK(findFireflies(x, {}, nullptr).empty());
 }
 
+TEST_CASE("Fireflies that share a neighbourhood are its light and keep most of it") {
+  const auto features = [](float albedoOfFireflies) {
+    Features f;
+    for (FeaturePlanes<Rgb<float>>* planes : {&f.albedo, &f.normal}) {
+      planes->mean = Rgb<float>(40, 30, 0.5f);
+      planes->half[0] = planes->half[1] = planes->mean;
+    }
+    for (size_t i = 0; i < f.albedo.mean.size(); i += 7)
+      for (size_t c = 0; c < 3; ++c) f.albedo.mean[c][i] = albedoOfFireflies;
+    return f;
+  };
+  Estimate x = flat(1.0f, 1e-4f);
+  std::vector<size_t> places;  // far enough apart to stand out
+  for (int y = 5; y < 30; y += 7)
+    for (int u = 0; u < 40; u += 7) places.push_back(x.mean[0].index(u, y) / 7 * 7);
+  for (const size_t i : places) setPixel(x, i, 51, {201, 1, 1, 1}, 2500);
+  const Features alike = features(0.5f), lamps = features(3.0f);
+  const std::vector<Firefly> fireflies = findFireflies(x, {&x.quarter}, &alike);
+  REQUIRE(fireflies.size() == places.size());
+  Rgb<float> image = x.mean, variance = x.variance;
+  replaceValues(image, fireflies);
+  replaceVariances(variance, fireflies);
+  for (const Firefly& f : fireflies) {
+    // Within 20 pixels lie about 41² / 49 of them, mirrored ones counted again.
+    CHECK(f.kept > 1 - 12.0 / 25);
+    CHECK(f.kept < 1 - 12.0 / 45);
+    CHECK(image[0][f.index] == doctest::Approx(1 + 50 * f.kept));
+    CHECK(variance[0][f.index] == doctest::Approx(1e-4 + f.kept * (2500 - 1e-4)));
+  }
+  // One alone is noise; pixels of another surface may be lamps; without features nobody knows.
+  for (const size_t i : places)
+    if (i != places[8]) setPixel(x, i, 1, {1, 1, 1, 1}, 1e-4f);
+  REQUIRE(findFireflies(x, {&x.quarter}, &alike).size() == 1);
+  CHECK(findFireflies(x, {&x.quarter}, &alike)[0].kept == 0);
+  for (const size_t i : places) setPixel(x, i, 51, {201, 1, 1, 1}, 2500);
+  for (const Firefly& f : findFireflies(x, {&x.quarter}, &lamps)) CHECK(f.kept == 0);
+  for (const Firefly& f : findFireflies(x, {&x.quarter}, nullptr)) CHECK(f.kept == 0);
+}
+
 TEST_CASE("A firefly in one quarter leaves nothing in its neighbours either") {
   // Noise of 0.03 around 1, and one pixel of 200 in one quarter.
   Estimate x = flat(1.0f, 0);

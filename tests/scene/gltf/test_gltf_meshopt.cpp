@@ -244,7 +244,7 @@ TEST_CASE("gltf: colours under meshopt's filter COLOR are those of plain data") 
   GltfFile plain = quadFile();
   Bytes luma;
   std::vector<uint8_t> grey;
-  for (const uint8_t y : {255, 128, 3, 0}) {
+  for (const uint8_t y : std::initializer_list<uint8_t>{255, 128, 3, 0}) {
     luma.insert(luma.end(), {y, 0, 0, 255});
     grey.insert(grey.end(), {y, y, y, 255});
   }
