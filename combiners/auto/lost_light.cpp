@@ -17,25 +17,31 @@ namespace {
 constexpr int kRadius = 60, kShareRadius = 30;  // of windows, and of the means of |d|² and V that a share is found by
 constexpr double kLeastSamples = 12;
 constexpr double kMostGain = 4;
+constexpr double kStandsOut = 3;
 constexpr double kDark = 1e-6;  // of images of order 1
 
 double valueOf(const Rgb<float>& image, size_t c, size_t i) { return static_cast<double>(image[c][i]); }
 
-double brighter(const Rgb<float>& x, const Rgb<float>& image, size_t i) {
-  double sum = 0;
-  for (size_t c = 0; c < 3; ++c) sum += valueOf(x, c, i) - valueOf(image, c, i);
-  return sum / 3;
+double brightness(const Rgb<float>& image, size_t i) {
+  return (valueOf(image, 0, i) + valueOf(image, 1, i) + valueOf(image, 2, i)) / 3;
 }
 
-// What counts of every pixel: nothing where its neighbours are unlike, else what only one half of x is brighter by.
-Plane<float> whatCounts(const Estimate& image, const Estimate& x, const Features* features) {
-  Plane<float> counts = features ? alikePixels(*features) : Plane<float>(image.mean.width(), image.mean.height(), 1.0f);
-  parallelChunks(counts.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      const double a = brighter(x.half[0], image.mean, i), b = brighter(x.half[1], image.mean, i);
-      if (!(a > 0 && b > 0)) continue;
-      counts[i] = static_cast<float>(static_cast<double>(counts[i]) * (1 - 2 * std::sqrt(a * b) / (a + b)));
-    }
+// What counts of a pixel. One that stands out may be a lamp: nothing if it stands out from other surfaces, else what
+// only one half of x shows.
+double whatCounts(const Estimate& image, const Estimate& x, const Features* features, int column, int row) {
+  const size_t i = image.mean[0].index(column, row);
+  const double before = brightness(image.mean, i);
+  if (!(brightness(x.mean, i) > kStandsOut * before)) return 1;
+  if (features && !isAlike(*features, column, row)) return 0;
+  const double a = brightness(x.half[0], i) - before, b = brightness(x.half[1], i) - before;
+  return a > 0 && b > 0 ? 1 - 2 * std::sqrt(a * b) / (a + b) : 1;
+}
+
+Plane<float> allThatCounts(const Estimate& image, const Estimate& x, const Features* features) {
+  Plane<float> counts(image.mean.width(), image.mean.height(), kUnfilled);
+  parallelRows(counts.height, [&](int row) {
+    for (int column = 0; column < counts.width; ++column)
+      counts.at(column, row) = static_cast<float>(whatCounts(image, x, features, column, row));
   });
   return counts;
 }
@@ -122,7 +128,7 @@ bool giveBack(Rgb<float>& image, const LostLight& of) {
 }  // namespace
 
 std::optional<Estimate> withLostLight(const Estimate& image, const Estimate& x, const Features* features) {
-  const Plane<float> counts = whatCounts(image, x, features);
+  const Plane<float> counts = allThatCounts(image, x, features);
   Estimate out;
   out.mean = image.mean;
   if (!giveBack(out.mean, lostLight(image.mean, x.mean, x.variance, counts))) return std::nullopt;

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "renderer/core/parallel.h"
-
 namespace braid {
 
 namespace {
@@ -30,24 +28,18 @@ double unlikeness(const Features& features, size_t i, size_t j) {
          squaredDistance(features.normal.mean, i, j) / (2 * kNormalDeviation * kNormalDeviation);
 }
 
-Plane<float> alikePixels(const Features& features) {
-  const int width = features.albedo.mean.width(), height = features.albedo.mean.height();
-  Plane<float> alike(width, height, kUnfilled);
-  parallelRows(height, [&](int y) {
-    for (int x = 0; x < width; ++x) {
-      const size_t at = alike.index(x, y);
-      double weight = 0, most = 0;
-      for (int v = std::max(0, y - kRadius); v <= std::min(height - 1, y + kRadius); ++v)
-        for (int u = std::max(0, x - kRadius); u <= std::min(width - 1, x + kRadius); ++u) {
-          if (u == x && v == y) continue;
-          const double nearness = std::exp(-static_cast<double>((u - x) * (u - x) + (v - y) * (v - y)) / 8);
-          most += nearness;
-          weight += nearness * std::exp(-unlikeness(features, at, alike.index(u, v)));
-        }
-      alike[at] = weight >= kAlike * most ? 1.0f : 0.0f;
+bool isAlike(const Features& features, int x, int y) {
+  const Plane<float>& plane = features.albedo.mean[0];
+  const size_t at = plane.index(x, y);
+  double weight = 0, most = 0;
+  for (int v = std::max(0, y - kRadius); v <= std::min(plane.height - 1, y + kRadius); ++v)
+    for (int u = std::max(0, x - kRadius); u <= std::min(plane.width - 1, x + kRadius); ++u) {
+      if (u == x && v == y) continue;
+      const double nearness = std::exp(-static_cast<double>((u - x) * (u - x) + (v - y) * (v - y)) / 8);
+      most += nearness;
+      weight += nearness * std::exp(-unlikeness(features, at, plane.index(u, v)));
     }
-  });
-  return alike;
+  return weight >= kAlike * most;
 }
 
 }  // namespace braid

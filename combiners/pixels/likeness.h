@@ -10,7 +10,7 @@ namespace braid {
 // have, 0.25 and 0.15. Above 1.5 they count as of different surfaces.
 double unlikeness(const Features& features, size_t i, size_t j);
 
-// 1 for pixels whose 24 neighbours, weighted by nearness, are alike to 0.4 and more by exp(-unlikeness), else 0.
-Plane<float> alikePixels(const Features& features);
+// Whether the 24 neighbours of a pixel, weighted by nearness, are alike to 0.4 and more by exp(-unlikeness).
+bool isAlike(const Features& features, int x, int y);
 
 }  // namespace braid
