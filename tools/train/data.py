@@ -6,8 +6,8 @@
 
 Renders three views of each scene from FIRST to before END (tools/train/scenes.py) and writes FOLDER/SCENE_VIEW.npz. A
 view that is there is left alone, so that an interrupted run goes on, and several can share a folder. The target is what
-`auto` makes of the samples named, by bdpt: ten times nearer to the truth than they are, and nearly as bright. What it
-makes of `pt` is up to a third too dark where lamps are behind glass, and so would be whatever learns from it.
+`auto` makes of the samples named, by bdpt: ten times nearer to the truth than they are, and as bright. Where lamps are
+behind glass it is too dark by `pt`, and so would be whatever learns from it.
 """
 
 import argparse
@@ -98,7 +98,7 @@ class Renderer:
         return {"target": truth.astype(np.float32), "samples": np.array(chosen), **arrays}
 
 
-def make_views(description, size, views, renderer_of):
+def make_views(description, size, target, views, renderer_of):
     """The command line of a script of data: renders so many views of every scene named and writes what is kept."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("first", type=int)
@@ -106,7 +106,7 @@ def make_views(description, size, views, renderer_of):
     parser.add_argument("folder")
     parser.add_argument("--braid", default="tools/braid")
     parser.add_argument("--size", default=size)
-    parser.add_argument("--target", type=int, default=64)
+    parser.add_argument("--target", type=int, default=target)
     options = parser.parse_args()
     import scenes  # reads the repository's generator
 
@@ -134,4 +134,4 @@ def make_views(description, size, views, renderer_of):
 
 
 if __name__ == "__main__":
-    make_views(__doc__, "192x128", 3, Renderer)
+    make_views(__doc__, "192x128", 64, 3, Renderer)

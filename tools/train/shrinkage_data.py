@@ -56,4 +56,4 @@ class ShrinkageRenderer(Renderer):
 
 
 if __name__ == "__main__":
-    make_views(__doc__, "96x64", 2, ShrinkageRenderer)
+    make_views(__doc__, "96x64", 96, 2, ShrinkageRenderer)
