@@ -42,11 +42,6 @@ const OptionInfo kDirectIndirect{"auto-direct-indirect", 1, "0: direct and indir
 const OptionInfo kLostLight{"auto-lost-light", 1, "0: light that filters have lost is not given back"};
 const OptionInfo kFireflies{"auto-remove-fireflies", 1, "0: keep fireflies"};
 
-// What images from filters of direct and indirect light keep of the squared bias that their halves show
-// (combiners/EXPERIMENTS.md, Bias that filters keep): filters blur less as variances fall, but not all bias goes with
-// the variance.
-constexpr double kBiasKeptByParts = 0.85;
-
 // Fewer: the variances of direct and of indirect light are known worse than that of their sum, and x, whose variance is
 // too small wherever no firefly has fallen yet, is no image to be pulled to (combiners/EXPERIMENTS.md, Auto at few
 // samples).
@@ -201,8 +196,7 @@ class AutoRun {
   bool isFused_ = false;
   FusedEstimate fused_;
   std::vector<const Estimate*> others_;  // images of other denoisers, and photon maps that are not fused
-  double biasKept_ = 1;
-  std::vector<PixelValues> removed_;  // the fireflies of x as they were
+  std::vector<PixelValues> removed_;     // the fireflies of x as they were
   std::vector<Estimate> filters_, shrunk_;
   MethodResult result_;
 };
@@ -252,7 +246,6 @@ void AutoRun::filterParts() {
   if (isFused_ || !isOn(kDirectIndirect) || (x_->passes > 0 && x_->passes < kPartsPasses) || !hasDirectIndirect(*x_))
     return;
   filters_ = autoFiltersOfParts(*x_, removesFireflies(), in_.features, in_.cancel);
-  if (!filters_.empty()) biasKept_ = kBiasKeptByParts;
 }
 
 void AutoRun::removeFireflies() {
@@ -313,7 +306,7 @@ void AutoRun::giveLostLight() {
 
 void AutoRun::estimateError() {
   const Rgb<float>& noise = fused_.noise.empty() ? x_->variance : fused_.noise;
-  result_.error = crossHalfErrorMap(result_.image.half, *x_, noise, result_.image.mean, {true, biasKept_});
+  result_.error = mixtureErrorMap(result_.image.half, noise, result_.image.mean);
   if (!fused_.squaredBias.empty()) addTo(result_.error, smoothedSquaredBias(fused_.squaredBias, result_.image.mean));
 }
 

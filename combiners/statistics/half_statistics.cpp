@@ -2,6 +2,7 @@
 #include "combiners/statistics/half_statistics.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "combiners/pixels/box_mean.h"
 #include "combiners/pixels/channel_mean.h"
@@ -13,6 +14,7 @@ namespace braid {
 namespace {
 
 constexpr int kBiasRadius = 7;
+constexpr double kMostFiltered = 49;  // C of mixtureErrorMap()
 
 double squaredDifference(const Rgb<float>& a, const Rgb<float>& b, size_t i, size_t c) {
   const double d = static_cast<double>(a[c][i]) - static_cast<double>(b[c][i]);
@@ -24,13 +26,16 @@ Plane<float> varianceSamples(const Rgb<float> (&halves)[2]) {
                      [&](size_t i, size_t c) { return 0.25 * squaredDifference(halves[0], halves[1], i, c); });
 }
 
+double channelMeanOf(const Rgb<float>& image, size_t i) {
+  return (static_cast<double>(image[0][i]) + static_cast<double>(image[1][i]) + static_cast<double>(image[2][i])) / 3;
+}
+
 // What errors are measured in to be relative: the squared brightness + 0.01.
 Plane<float> relativeUnits(const Rgb<float>& guide) {
   Plane<float> unit(guide.width(), guide.height(), kUnfilled);
   parallelChunks(unit.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
-      double level = 0;
-      for (size_t c = 0; c < 3; ++c) level += static_cast<double>(guide[c][i]) / 3;
+      const double level = channelMeanOf(guide, i);
       unit[i] = finiteFloat(level * level + 0.01);
     }
   });
@@ -86,37 +91,52 @@ Plane<float> squaredErrorSamples(const Rgb<float> (&halves)[2], const Estimate& 
 }
 
 Plane<float> crossHalfErrorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
-                               const Rgb<float>& guide, const BiasScaling& scaling) {
-  const bool follows = scaling.follows;
+                               const Rgb<float>& guide) {
   // The planes take the relative values in the place of the samples, then their means, and last the errors.
   Plane<float> samples = squaredErrorSamples(halves, unbiased, variance);
   Plane<float> spread = varianceSamples(halves);
   const Plane<float> unit = relativeUnits(guide);
-  Plane<float> levels;
-  if (follows) levels = Plane<float>(guide.width(), guide.height(), kUnfilled);
   parallelChunks(unit.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
-      double v = 0;
-      for (size_t c = 0; c < 3; ++c) v += static_cast<double>(variance[c][i]) / 3;
       const auto u = static_cast<double>(unit[i]);
-      samples[i] = finiteFloat((static_cast<double>(samples[i]) - static_cast<double>(spread[i])) / (u + v));
+      samples[i] = finiteFloat((static_cast<double>(samples[i]) - static_cast<double>(spread[i])) /
+                               (u + channelMeanOf(variance, i)));
       spread[i] = finiteFloat(static_cast<double>(spread[i]) / u);
-      if (follows) levels[i] = finiteFloat(v / (u + v));
     }
   });
   spread = boxMean<float>(spread, 1);
   samples = boxMean<float>(samples, kBiasRadius);
-  if (follows) levels = boxMean<float>(levels, kBiasRadius);
   Plane<float> out = std::move(samples);
   parallelChunks(out.size(), kPixelChunk, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      const auto noise = static_cast<double>(spread[i]), ofHalves = std::max(0.0, static_cast<double>(out[i]));
-      const double v2 = follows ? 2 * static_cast<double>(levels[i]) : 0;
-      const double share = follows ? v2 / std::max(v2 + 2 * noise + ofHalves, 1e-300) : 1;
-      out[i] = finiteFloat(static_cast<double>(unit[i]) * (noise + scaling.kept * share * ofHalves));
-    }
+    for (size_t i = begin; i < end; ++i)
+      out[i] = finiteFloat(static_cast<double>(unit[i]) *
+                           (static_cast<double>(spread[i]) + std::max(0.0, static_cast<double>(out[i]))));
   });
   return out;
+}
+
+Plane<float> mixtureErrorMap(const Rgb<float> (&halves)[2], const Rgb<float>& variance, const Rgb<float>& guide) {
+  Plane<float> spread = varianceSamples(halves);
+  Plane<float> noise(guide.width(), guide.height(), kUnfilled);
+  const Plane<float> unit = relativeUnits(guide);
+  parallelChunks(unit.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      const auto u = static_cast<double>(unit[i]);
+      spread[i] = finiteFloat(static_cast<double>(spread[i]) / u);
+      noise[i] = finiteFloat(channelMeanOf(variance, i) / u);
+    }
+  });
+  const Plane<float> wide = boxMean<float>(spread, kBiasRadius);
+  noise = boxMean<float>(noise, kBiasRadius);
+  spread = boxMean<float>(spread, 1);
+  parallelChunks(unit.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      const auto s = static_cast<double>(wide[i]), v = static_cast<double>(noise[i]);
+      const double ratio = v > s ? 1 / std::sqrt(1 / kMostFiltered + s / v) : 1;
+      spread[i] = finiteFloat(static_cast<double>(unit[i]) * static_cast<double>(spread[i]) * std::max(1.0, ratio));
+    }
+  });
+  return spread;
 }
 
 Plane<float> smoothedSquaredBias(const Plane<float>& squaredBias, const Rgb<float>& guide) {

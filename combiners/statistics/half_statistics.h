@@ -30,16 +30,14 @@ Plane<float> squaredErrorSamples(const Rgb<float> (&halves)[2], const Estimate& 
 // the squared bias, with u = (mean of `guide`)² + 0.01. Both are averaged as relative errors: a lamp would lend the
 // dark pixels around it an error that is beyond anything that they can have. Its sum over the image is meant, not its
 // pixels: where it is smallest it is too small, by selection. The halves must be independent of each other.
-//
-// The squared bias is that of images of half the samples, which `scaling` turns into that of all of them.
-struct BiasScaling {
-  // It falls with v, as that of an image which shares out between x and another one as their errors ask for it
-  // (combiners/README.md, Errors across halves).
-  bool follows = false;
-  double kept = 1;  // it is multiplied by that, for filters whose bias falls as they see more samples
-};
 Plane<float> crossHalfErrorMap(const Rgb<float> (&halves)[2], const Estimate& unbiased, const Rgb<float>& variance,
-                               const Rgb<float>& guide, const BiasScaling& scaling = {});
+                               const Rgb<float>& guide);
+
+// The map of an image that is mixed, as its errors ask for it, of the unbiased image and of what filters make of it:
+//   u box3(s / u) / sqrt(1 / C + box15(s / u) / box15(v / u)),      s = ¼ (z_A - z_B)², C = 49,
+// but at least u box3(s / u). v is the variance of the unbiased image (combiners/README.md, Errors across halves). It
+// needs no halves but the image's own, and holds from four samples on.
+Plane<float> mixtureErrorMap(const Rgb<float> (&halves)[2], const Rgb<float>& variance, const Rgb<float>& guide);
 
 // u max(0, box15(squaredBias / u)), u as above: of unbiased samples of a squared bias, which may be negative.
 Plane<float> smoothedSquaredBias(const Plane<float>& squaredBias, const Rgb<float>& guide);

@@ -61,23 +61,50 @@ TEST_CASE("A photon map without bias leaves none in the error, however noisy its
         doctest::Approx(sqr(share) * 0.04 / 1.01).epsilon(0.1));
 }
 
-TEST_CASE(
-    "Squared errors that halves show are those of half the samples: less of them is the image's where it follows") {
-  // Halves of x deviate by +-s, so that v = s² / 2; both halves of the image are off by b.
-  const double s = 0.1, b = 0.05, v = s * s / 2;
-  Estimate x = flat(1.0f, static_cast<float>(v));
-  x.half[0] = Rgb<float>(40, 30, static_cast<float>(1 + s));
-  x.half[1] = Rgb<float>(40, 30, static_cast<float>(1 - s));
-  const Rgb<float> halves[2] = {Rgb<float>(40, 30, static_cast<float>(1 + b)),
-                                Rgb<float>(40, 30, static_cast<float>(1 + b))};
-  const double unit = 1.01, measured = unit * b * b / (unit + v);
-  CHECK(crossHalfErrorMap(halves, x, x.variance, x.mean)[500] == doctest::Approx(measured).epsilon(1e-3));
-  CHECK(crossHalfErrorMap(halves, x, x.variance, x.mean, {true, 1})[500] ==
-        doctest::Approx(measured * 2 * v / (2 * v + b * b)).epsilon(1e-3));
-  CHECK(crossHalfErrorMap(halves, x, x.variance, x.mean, {true, 0.5})[500] ==
-        doctest::Approx(0.5 * measured * 2 * v / (2 * v + b * b)).epsilon(1e-3));
-  const Estimate exact = flat(1.0f, 0.0f);
-  CHECK(crossHalfErrorMap(exact.half, exact, exact.variance, exact.mean, {true, 1})[500] == 0);
+TEST_CASE("The error of an image that is mixed of x and a biased one, as their errors ask for it, is told") {
+  const int width = 120, height = 90;
+  const double v = 0.01;
+  for (const double bias : {0.0, 0.02, 0.05, 0.1, 0.3}) {
+    // x deviates by n, the biased image by b: with the share w = b² / (v + b²) of x the error is least, w v.
+    const double w = sqr(bias) / (v + sqr(bias));
+    std::mt19937 random(1);
+    std::normal_distribution<double> normal;
+    Rgb<float> halves[2] = {Rgb<float>(width, height), Rgb<float>(width, height)};
+    const Rgb<float> image(width, height, 1.0f), variance(width, height, static_cast<float>(v));
+    double truly = 0;
+    for (size_t i = 0; i < image.size(); ++i) {
+      double mean = 0;
+      for (Rgb<float>& half : halves) {
+        const double value = 1 + w * std::sqrt(2 * v) * normal(random) + (1 - w) * bias;
+        for (size_t c = 0; c < 3; ++c) half[c][i] = static_cast<float>(value);
+        mean += value / 2;
+      }
+      truly += sqr(mean - 1) / static_cast<double>(image.size());
+    }
+    const Plane<float> map = mixtureErrorMap(halves, variance, image);
+    double told = 0;
+    for (size_t i = 0; i < map.size(); ++i) told += static_cast<double>(map[i]) / static_cast<double>(map.size());
+    // Of 1 / C the told error is lower: 49 times as many samples are the most that a filter makes up for.
+    const double expected = w > 0 ? w * v / std::sqrt(1 + 1 / (49 * w * w)) : 0;
+    CHECK(told == doctest::Approx(expected).epsilon(0.03));  // four standard errors of the spread
+    if (bias >= 0.05) CHECK(told == doctest::Approx(truly).epsilon(0.25));
+  }
+}
+
+TEST_CASE("What halves of all kinds tell of an error stays within what they show") {
+  const Rgb<float> image(40, 30, 1.0f);
+  const auto told = [&](double spread, double v) {
+    const double d = std::sqrt(spread);
+    const Rgb<float> halves[2] = {Rgb<float>(40, 30, static_cast<float>(1 + d)),
+                                  Rgb<float>(40, 30, static_cast<float>(1 - d))};
+    return static_cast<double>(mixtureErrorMap(halves, Rgb<float>(40, 30, static_cast<float>(v)), image)[500]);
+  };
+  CHECK(told(0, 0) == 0);
+  CHECK(told(0, 1) == 0);
+  CHECK(told(0.01, 0) == doctest::Approx(0.01).epsilon(1e-3));  // noisier than x: what it is
+  CHECK(told(0.01, 0.005) == doctest::Approx(0.01).epsilon(1e-3));
+  CHECK(told(0.01, 0.0101) == doctest::Approx(0.01).epsilon(0.02));  // x itself
+  CHECK(told(1e-6, 1e30) == doctest::Approx(7e-6).epsilon(1e-3));    // filtered as far as can be
 }
 
 TEST_CASE("Where the unbiased image has not found the light, the photon map is believed") {
