@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 
 #include "combiners/pixels/box_mean.h"
@@ -104,24 +105,31 @@ LostLight lostLight(const Rgb<float>& image, const Rgb<float>& x, const Rgb<floa
   distance = boxMean<float>(distance, kShareRadius);
   noise = boxMean<float>(noise, kShareRadius);
   out.share = Plane<float>(noise.width, noise.height, 0.0f);
-  for (size_t i = 0; i < noise.size(); ++i) {
-    const double d = static_cast<double>(distance[i]);
-    if (d > 0) out.share[i] = static_cast<float>(std::max(0.0, 1 - kLeastSamples * static_cast<double>(noise[i]) / d));
-  }
+  parallelChunks(noise.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      const double d = static_cast<double>(distance[i]);
+      if (!(d > 0)) continue;
+      out.share[i] = static_cast<float>(std::max(0.0, 1 - kLeastSamples * static_cast<double>(noise[i]) / d));
+    }
+  });
   return out;
 }
 
 // Multiplies an image by its gain; whether that is above 1 anywhere.
 bool giveBack(Rgb<float>& image, const LostLight& of) {
-  bool any = false;
-  for (size_t c = 0; c < 3; ++c)
-    for (size_t i = 0; i < image.size(); ++i) {
-      const double level = static_cast<double>(of.level[c][i]);
-      if (!(of.share[i] > 0) || !(level > 0)) continue;
-      const double gain = 1 + static_cast<double>(of.share[i]) * static_cast<double>(of.lost[c][i]) / level;
-      image[c][i] = finiteFloat(valueOf(image, c, i) * std::clamp(gain, 1.0, kMostGain));
-      any = any || gain > 1;
-    }
+  std::atomic<bool> any = false;
+  parallelChunks(image.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    bool here = false;
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t i = begin; i < end; ++i) {
+        const double level = static_cast<double>(of.level[c][i]);
+        if (!(of.share[i] > 0) || !(level > 0)) continue;
+        const double gain = 1 + static_cast<double>(of.share[i]) * static_cast<double>(of.lost[c][i]) / level;
+        image[c][i] = finiteFloat(valueOf(image, c, i) * std::clamp(gain, 1.0, kMostGain));
+        here = here || gain > 1;
+      }
+    if (here) any = true;
+  });
   return any;
 }
 
