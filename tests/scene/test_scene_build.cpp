@@ -83,6 +83,42 @@ TEST_CASE("A mesh is closed when all its edges meet an opposite one and its face
   CHECK_FALSE(isClosedOutward(two));
 }
 
+TEST_CASE("A solid that looks inward is turned outward, with its normals, unless it may be the hollow of another") {
+  CHECK(facingOf(cube(true)) == Facing::Inward);
+  CHECK(facingOf(cube(false, false, 5)) == Facing::Open);
+  Material glass = singleSided();
+  glass.transmission = 1;
+  glass.thinWalled = false;
+  SceneData scene = oneMesh(cube(true), glass);
+  TriangleMesh& mesh = scene.meshes[0];
+  for (const Vec3& p : mesh.positions) {
+    mesh.normals.push_back(-glm::normalize(p));  // to the front, which is inward
+    mesh.tangents.push_back({1, 0, 0, 1});
+  }
+  CHECK(turnSolidsOutward(scene) == 1);
+  CHECK(isClosedOutward(mesh));
+  for (size_t i = 0; i < mesh.positions.size(); ++i) {
+    CHECK(glm::dot(mesh.normals[i], mesh.positions[i]) > 0);
+    CHECK(mesh.tangents[i].w == -1);
+  }
+  CHECK(turnSolidsOutward(scene) == 0);
+  // Normals that look outward already stay.
+  turnInsideOut(mesh);
+  for (Vec3& n : mesh.normals) n = -n;
+  CHECK(turnSolidsOutward(scene) == 1);
+  for (size_t i = 0; i < mesh.positions.size(); ++i) CHECK(glm::dot(mesh.normals[i], mesh.positions[i]) > 0);
+
+  // Not of glass, or the hollow of a bottle: as it is.
+  scene = oneMesh(cube(true), singleSided());
+  CHECK(turnSolidsOutward(scene) == 0);
+  scene = oneMesh(cube(true), glass);
+  scene.meshes.push_back(cube());
+  scene.instances.push_back({1, glm::scale(Mat4(1), Vec3(2)), {}});
+  CHECK(turnSolidsOutward(scene) == 0);
+  scene.instances[1].toWorld = glm::scale(Mat4(1), Vec3(0.5f));
+  CHECK(turnSolidsOutward(scene) == 1);
+}
+
 TEST_CASE("Only surfaces that let rays pass get an any-hit filter") {
   const Material plain = diffuseMaterial(Spectrum(0.5f));
   Material blend = plain, glass = singleSided(), leaf = singleSided();

@@ -34,8 +34,12 @@ void addDefaults(SceneData& scene, const LoadOptions& options, Report& report) {
   }
 }
 
-// A walk ends at the surface of its solid, so that there must be one all around.
-void checkSolids(const SceneData& scene, Report& report) {
+// Light that enters a solid must find its front outward; a walk ends at its surface, so that there must be one all
+// around.
+void checkSolids(SceneData& scene, Report& report) {
+  if (turnSolidsOutward(scene) > 0)
+    report.problem("/meshes", "a closed mesh with a volume (KHR_materials_volume) looks inward; turn its faces",
+                   "they are turned outward");
   for (const TriangleMesh& mesh : scene.meshes)
     if (scene.materials[mesh.material].scatters() && !isClosedOutward(mesh))
       report.warn("",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A flaw costs only the thing that it is in: the rest is loaded, and one warning a kind says what was left out. Flaws
 // of what the picture does not use are notes. With `strict` every file of this test is refused.
+#include "renderer/scene/data/closed_mesh.h"
 #include "tests/scene/gltf/gltf_lenient.h"
 #include "tests/support/contains.h"
 #include "tests/support/gltf_fixture.h"
@@ -199,6 +200,25 @@ TEST_CASE("lenient: numbers beyond a float") {
   file.root["scenes"][0]["nodes"] = {0, 1};
   const SceneData scene = loadWarned(file, "/nodes/1/translation/0: is 1e+39, too large for a 32-bit float");
   CHECK(scene.instances.size() == 1);
+}
+
+TEST_CASE("lenient: a solid whose faces look inward is turned outward") {
+  for (const bool inward : {false, true}) {
+    GltfFile file = triangleFile();
+    const int position = file.accessor<float>({0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}, "VEC3");
+    const std::vector<uint16_t> outward = {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3};
+    const int indices =
+        file.accessor<uint16_t>(inward ? std::vector<uint16_t>(outward.rbegin(), outward.rend()) : outward, "SCALAR");
+    file.root["materials"] = {{{"extensions",
+                                {{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
+                                 {"KHR_materials_volume", {{"thicknessFactor", 1}}}}}}};
+    file.root["meshes"][0]["primitives"][0] = {
+        {"attributes", {{"POSITION", position}}}, {"indices", indices}, {"material", 0}};
+    const SceneData scene = file.load();
+    CHECK(isClosedOutward(scene.meshes[0]));
+    CHECK(hasWarning(scene, "/meshes: a closed mesh with a volume") == inward);
+    CHECK(errorOf(file).empty() != inward);
+  }
 }
 
 TEST_CASE("lenient: wrong JSON types everywhere cost a warning at most") {
