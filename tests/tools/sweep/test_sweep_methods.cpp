@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include "renderer/core/error.h"
+#include "tests/combiners/auto_cases.h"
 #include "tests/support/gltf_fixture.h"
 #include "tests/support/render_fixture.h"
 #include "tools/sweep/sweep.h"
@@ -49,6 +50,18 @@ TEST_CASE("Methods read the features of their own first integrator, whatever els
   SweepJob job;
   job.cells = {{&sppm, 8}, {&mixed, 8}};
   CHECK(job.inputs() == mixed.inputs);
+}
+
+TEST_CASE("The unbiased image is that of the unbiased integrator, wherever the plan names the photon map") {
+  using namespace test::auto_cases;
+  const auto estimates = std::make_shared<Estimates>(kept(noisyCase(16), {"pt", "sppm"}));
+  const auto imageBy = [&](const char* plan) {
+    return sweepMethods({"auto/auto"}, test::integrators(), {}, plan).at(0).finish(estimates, {});
+  };
+  const MethodImage first = imageBy("pt+sppm"), last = imageBy("sppm+pt");
+  REQUIRE(!first.image.empty());
+  CHECK(first.error == last.error);
+  for (size_t c = 0; c < 3; ++c) CHECK(first.image[c].data == last.image[c].data);
 }
 
 TEST_CASE("Names of methods are integrators, or denoisers and combiners with the integrators that they read") {

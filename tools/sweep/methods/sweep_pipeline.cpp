@@ -145,6 +145,9 @@ Parsed parse(const std::string& name, const Integrators& integrators) {
     if (correlated != integrators.end() && std::find(list.begin(), list.end(), *correlated) == list.end())
       list.push_back(*correlated);
   }
+  // The first one is the unbiased image, and plans name photon maps in any order.
+  const auto unbiased = std::find_if(list.begin(), list.end(), [](const Integrator* i) { return i->unbiased(); });
+  if (unbiased != list.end()) std::rotate(list.begin(), unbiased, unbiased + 1);
   AvailableEstimates available;
   available.features = available.reference = true;
   for (const Integrator* i : list) {
