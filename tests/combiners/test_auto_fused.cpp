@@ -61,6 +61,21 @@ TEST_CASE("A photon map without bias leaves none in the error, however noisy its
         doctest::Approx(sqr(share) * 0.04 / 1.01).epsilon(0.1));
 }
 
+TEST_CASE("Squared errors that halves show are those of half the samples, relative to brightness and noise") {
+  // Halves of x deviate by +-s, so that v = s² / 2; both halves of the image are off by b.
+  const double s = 0.1, b = 0.05, v = s * s / 2;
+  Estimate x = flat(1.0f, static_cast<float>(v));
+  x.half[0] = Rgb<float>(40, 30, static_cast<float>(1 + s));
+  x.half[1] = Rgb<float>(40, 30, static_cast<float>(1 - s));
+  const Rgb<float> halves[2] = {Rgb<float>(40, 30, static_cast<float>(1 + b)),
+                                Rgb<float>(40, 30, static_cast<float>(1 + b))};
+  const double unit = 1.01;
+  CHECK(crossHalfErrorMap(halves, x, x.variance, x.mean)[500] ==
+        doctest::Approx(unit * b * b / (unit + v)).epsilon(1e-3));
+  const Estimate exact = flat(1.0f, 0.0f);
+  CHECK(crossHalfErrorMap(exact.half, exact, exact.variance, exact.mean)[500] == 0);
+}
+
 TEST_CASE("The error of an image that is mixed of x and a biased one, as their errors ask for it, is told") {
   const int width = 120, height = 90;
   const double v = 0.01;
@@ -84,7 +99,7 @@ TEST_CASE("The error of an image that is mixed of x and a biased one, as their e
     const Plane<float> map = mixtureErrorMap(halves, variance, image);
     double told = 0;
     for (size_t i = 0; i < map.size(); ++i) told += static_cast<double>(map[i]) / static_cast<double>(map.size());
-    // Of 1 / C the told error is lower: 49 times as many samples are the most that a filter makes up for.
+    // Without 1 / 49 it would be w v. That bounds the error to 7 times the spread, where next to nothing of x is left.
     const double expected = w > 0 ? w * v / std::sqrt(1 + 1 / (49 * w * w)) : 0;
     CHECK(told == doctest::Approx(expected).epsilon(0.03));  // four standard errors of the spread
     if (bias >= 0.05) CHECK(told == doctest::Approx(truly).epsilon(0.25));
@@ -127,10 +142,12 @@ TEST_CASE("A noisy lamp lends the dark pixels around it no error that they canno
   Estimate x = flat(0.01f, 1e-8f);
   const size_t lamp = x.mean[0].index(20, 15);
   setPixel(x, lamp, 100, {90, 110, 95, 105}, 16);
-  const Plane<float> error = crossHalfErrorMap(x.half, x, x.variance, x.mean);
-  const double beside = static_cast<double>(error[lamp + 3]);
-  CHECK(static_cast<double>(error[lamp]) > 0.1);
-  CHECK(beside / 0.01 < 0.02);  // relative; the lamp's own relative error is 0.0056
+  for (const Plane<float>& error :
+       {crossHalfErrorMap(x.half, x, x.variance, x.mean), mixtureErrorMap(x.half, x.variance, x.mean)}) {
+    const double beside = static_cast<double>(error[lamp + 3]);
+    CHECK(static_cast<double>(error[lamp]) > 0.1);
+    CHECK(beside / 0.01 < 0.02);  // relative; the lamp's own relative error is 0.0056
+  }
 }
 
 }  // namespace braid::test_auto_fused
