@@ -50,6 +50,13 @@ void addCells(CLI::App& command, SweepOptions& o) {
   showFirst(command, "Cells", {"--output", "--spp", "--time", "--methods", "--preset", "--seeds"});
 }
 
+// The same for every scene.
+void addLook(CLI::App& command, SweepOptions& o) {
+  addSize(command, o.look.size);
+  addSceneLook(command, o.look);
+  showFirst(command, kSceneHelp, {"--size", "--camera", "--look-at", "--env"});
+}
+
 void addReferences(CLI::App& command, SweepOptions& o) {
   command.add_option("--reference-spp", o.referenceSpp, "Samples of the references that are rendered")
       ->capture_default_str()
@@ -63,7 +70,6 @@ void addReferences(CLI::App& command, SweepOptions& o) {
 
 void addMeasurements(CLI::App& command, SweepOptions& o) {
   addItems(command, "--metric", o.metrics, "Metrics, the one of plots and ratios first (default: all, relL2 first)");
-  addSize(command, o.size);
   command.add_option("--max-depth", o.maxDepth, "Longest path in segments, the camera's included")
       ->capture_default_str()
       ->check(wholeNumber(1, 1000000));
@@ -72,14 +78,13 @@ void addMeasurements(CLI::App& command, SweepOptions& o) {
   command.add_option("--crop-worst", o.cropWorst, "Fraction of the pixels, the worst, left out of relL2_trimmed")
       ->capture_default_str()
       ->check(number(0, 1, Ends::MostExcluded));
-  addIsa(command, o.isa);
   command
       .add_option("--external-command-timeout", o.commandTimeout, "Seconds after which an external command is ended")
       ->capture_default_str()
       ->check(number(0.01, 1e6));
   command.add_flag("--no-plots", o.noPlots, "Do not run gnuplot");
-  command.add_flag("-q,--quiet", o.quiet, "Errors only");
-  showFirst(command, "Measurement", {"--metric", "--size", "--max-depth", "--threads", "--no-plots", "--quiet"});
+  command.add_flag("-q,--quiet", o.look.quiet, "Errors only");
+  showFirst(command, "Measurement", {"--metric", "--max-depth", "--threads", "--no-plots", "--quiet"});
 }
 
 constexpr const char* kSweepHints =
@@ -89,6 +94,7 @@ constexpr const char* kSweepHints =
     "  braid sweep scenes/cornell.glb -o out --spp 4:1024 --methods pt --seeds 4\n"
     "  braid sweep scenes/*.glb -o out --time 1:32 --methods pt,bdpt --reference-spp 32768 \\\n"
     "      --reference-integrator pt,pool=bdpt\n"
+    "  braid sweep model.glb -o out --env sky.hdr --look-at 0,1,4,0,1,0\n"
     "  braid sweep scenes/cornell.glb -o out --spp 8:64 \\\n"
     "      --methods \"pt,external-command:my_denoiser {color} {albedo} {normal} {out}\"\n"
     "  braid sweep --preset papers scenes/*.glb -o papers";
@@ -99,6 +105,7 @@ void addSweep(CLI::App& app, Action& action) {
   const auto options = std::make_shared<SweepOptions>();
   CLI::App* command = app.add_subcommand("sweep", "Error against samples and time: scenes x methods x ladder x seeds");
   addCells(*command, *options);
+  addLook(*command, *options);
   addReferences(*command, *options);
   addMeasurements(*command, *options);
   command->footer(kSweepHints);

@@ -28,9 +28,6 @@ const std::vector<std::pair<std::string, DefaultLight>> kDefaultLights{
 const std::vector<std::pair<std::string, bool>> kOnOff{{"on", true}, {"off", false}};
 
 void addViewOptions(CLI::App& command, SceneChoice& c) {
-  addSize(command, c.size, "Full frame in pixels");
-  addParsed(command, "--crop", c.crop, parseWindow, "Only this part of the frame: upper left origin, ends excluded")
-      ->type_name("x0,y0,x1,y1");
   command.add_option("--camera", c.camera, "Camera by name or index (default: the first)")->type_name("NAME");
   addParsed(command, "--look-at", c.lookAt, parseLookAt, "Eye and target instead of the file's camera, in metres")
       ->type_name("ox,oy,oz,tx,ty,tz");
@@ -146,12 +143,19 @@ CLI::Option* addIsa(CLI::App& command, std::string& isa) {
       ->type_name("NAME");
 }
 
-void addSceneOptions(CLI::App& command, SceneChoice& c) {
-  command.add_option("SCENE", c.file, "glTF 2.0 file, .gltf or .glb")->required()->type_name("FILE");
+void addSceneLook(CLI::App& command, SceneChoice& c) {
   addViewOptions(command, c);
   addFrameOptions(command, c);
   addLightOptions(command, c);
   addLoadOptions(command, c);
+}
+
+void addSceneOptions(CLI::App& command, SceneChoice& c) {
+  command.add_option("SCENE", c.file, "glTF 2.0 file, .gltf or .glb")->required()->type_name("FILE");
+  addSize(command, c.size, "Full frame in pixels");
+  addParsed(command, "--crop", c.crop, parseWindow, "Only this part of the frame: upper left origin, ends excluded")
+      ->type_name("x0,y0,x1,y1");
+  addSceneLook(command, c);
   command.add_flag("-q,--quiet", c.quiet, "Errors only");
   command.add_flag("-v,--verbose", c.verbose, "Also print the plan");
   showFirst(command, kSceneHelp, {"--size", "--crop", "--camera", "--look-at", "--env"});

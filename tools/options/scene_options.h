@@ -42,6 +42,8 @@ struct SceneChoice {
   bool quiet = false, verbose = false;
 };
 void addSceneOptions(CLI::App& command, SceneChoice& choice);
+// Those of them that any number of scenes can have in common: camera, pose, light, reading.
+void addSceneLook(CLI::App& command, SceneChoice& choice);
 
 struct SampleChoice {
   std::vector<std::string> integrators{"pt"};

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/prepare/scene_identity.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "renderer/core/hash.h"
@@ -46,6 +48,17 @@ std::vector<StateOption> sceneIdentity(const SceneChoice& c, const SceneData& da
           {"--ground", yesOrNo(c.ground)},
           {"--aperture", c.aperture ? fmt::format("f/{} {}", c.aperture->fNumber, c.aperture->metres) : "none"},
           {"--focus", focusText(c)}};
+}
+
+std::string sceneLook(const SceneChoice& c, const SceneData& data) {
+  const std::vector<StateOption> usual = sceneIdentity({}, data);
+  std::vector<StateOption> chosen = sceneIdentity(c, data);
+  std::erase_if(chosen, [&](const StateOption& o) { return std::find(usual.begin(), usual.end(), o) != usual.end(); });
+  if (c.background)
+    chosen.push_back({"--background", fmt::format("{},{},{}", c.background->x, c.background->y, c.background->z)});
+  std::string text;
+  for (const StateOption& o : chosen) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", o.name, o.value);
+  return text;
 }
 
 }  // namespace braid

@@ -12,6 +12,7 @@
 #include "renderer/core/error.h"
 #include "renderer/images/image_codecs.h"
 #include "tools/options/open_scene.h"
+#include "tools/prepare/scene_identity.h"
 #include "tools/run/interrupt.h"
 #include "tools/sweep/sweep_folder.h"
 #include "tools/sweep/sweep_inputs.h"
@@ -76,7 +77,7 @@ Sweep::Sweep(const SweepOptions& options, MethodsOf methods, const std::vector<c
       integrators_(integrators),
       names_(sceneNames(options.scenes)),
       folder_(options, measurement_, [this](const std::string& text) { warn(text); }),
-      progress_(options.quiet),
+      progress_(options.look.quiet),
       interrupted_(installInterruptHandler()) {
   SampleChoice samples;
   samples.sampler = o_.sampler;
@@ -91,11 +92,8 @@ Sweep::Sweep(const SweepOptions& options, MethodsOf methods, const std::vector<c
 }
 
 SceneChoice Sweep::choiceOf(const std::string& file) const {
-  SceneChoice choice;
+  SceneChoice choice = o_.look;
   choice.file = file;
-  choice.isa = o_.isa;
-  choice.quiet = o_.quiet;
-  choice.size = o_.size;  // of its shape depends what the camera sees
   return choice;
 }
 
@@ -144,7 +142,7 @@ bool Sweep::renderReference(SweepScene& scene, const std::string& integrator) {
   progress_.expect(total, 0);
   progress_.begin(scene.name + " reference", total, 0);
   std::optional<SweepReference> reference = braid::renderReference(
-      folder_.path("references"), {*scene.scene, scene.camera, settings, integrators_},
+      folder_.path("references"), {*scene.scene, scene.camera, settings, integrators_, scene.look},
       [&](const Progress& p) {
         progress_.update(static_cast<double>(p.round), 0, fmt::format("{}/{} spp", p.round, p.rounds));
         return true;
@@ -157,7 +155,7 @@ bool Sweep::renderReference(SweepScene& scene, const std::string& integrator) {
 }
 
 bool Sweep::findReference(SweepScene& scene) {
-  const ReferenceFrame frame = referenceFrame(*scene.scene, scene.camera, settings_);
+  const ReferenceFrame frame = referenceFrame(*scene.scene, scene.camera, settings_, scene.look);
   const std::string file = valueForScene(o_.references, scene.name, "");
   std::string integrator = valueForScene(o_.referenceIntegrators, scene.name, "pt");
   if (integrator == "auto") integrator = scene.planned.find("sppm") == std::string::npos ? "pt" : "vcm";
@@ -253,15 +251,17 @@ bool Sweep::runScene(size_t index) {
   SweepScene scene;
   scene.name = names_[index];
   scene.file = o_.scenes[index];
-  OpenedScene opened = openScene(choiceOf(scene.file));
+  const SceneChoice choice = choiceOf(scene.file);
+  OpenedScene opened = openScene(choice);
   scene.loadSeconds = opened.loadSeconds;
   scene.camera = opened.camera;
   scene.scene = std::move(opened.scene);
+  scene.look = sceneLook(choice, scene.scene->data());
   scene.planned = plannedIntegrators(scene, settings_, integrators_);
   methods_ = methodsOf_(scene.planned);
   const std::vector<SweepJob> jobs = jobsOf(scene.name);
   if (!findReference(scene)) return false;
-  folder_.record(scene, referenceFrame(*scene.scene, scene.camera, settings_));
+  folder_.record(scene, referenceFrame(*scene.scene, scene.camera, settings_, scene.look));
   warmUp(scene, jobs.front());
   for (const SweepJob& job : jobs)
     if (!runJob(scene, job)) return false;
@@ -272,7 +272,7 @@ bool Sweep::runScene(size_t index) {
 
 void Sweep::warn(const std::string& text) {
   progress_.breakLine();
-  if (!o_.quiet) fmt::print(stderr, "warning: {}\n", text);
+  if (!o_.look.quiet) fmt::print(stderr, "warning: {}\n", text);
 }
 
 bool Sweep::reportFailures() const {

@@ -13,13 +13,14 @@
 #include <vector>
 
 #include "renderer/core/sampler.h"
-#include "tools/options/syntax/option_texts.h"
+#include "tools/options/scene_options.h"
 #include "tools/sweep/methods/sweep_method.h"
 
 namespace braid {
 
 struct SweepOptions {
   std::vector<std::string> scenes;                      // files
+  SceneChoice look;                                     // of every scene: all but its file, size of the frame included
   std::string output;                                   // folder
   std::string preset;                                   // its name, empty: none; already applied
   std::vector<double> spp, time;                        // rungs of the ladders, rising; both empty: 4:256 samples
@@ -30,13 +31,13 @@ struct SweepOptions {
   // One for all scenes, or SCENE=VALUE with the scene's name (the stem of its file).
   std::vector<std::string> references, referenceIntegrators;
   std::vector<std::string> metrics;  // empty: all
-  FrameSize size{640, 360};
   SamplerKind sampler = SamplerKind::Sobol;
-  std::string isa = "avx2";
   int maxDepth = 32, threads = 0;
   double cropWorst = 0.001;
   double commandTimeout = 600;  // seconds that one run of an external command may take
-  bool noPlots = false, quiet = false;
+  bool noPlots = false;
+
+  SweepOptions() { look.size = {640, 360}; }
 };
 
 // The rungs that "FROM:TO" (doubling), "A,B,C" or one number stand for, increasing. With `durations` items may have

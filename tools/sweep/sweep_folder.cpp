@@ -121,7 +121,8 @@ void SweepFolder::finish(const std::vector<std::string>& scenes, const std::vect
   writeRecord();
   for (const std::string& line : writeSweepReport(o_.output, table_, summary, record_, !o_.noPlots)) warn_(line);
   out << toMarkdown(summary);
-  if (!o_.quiet) fmt::print(stderr, "Saved: {} {} {}\n", path("sweep.csv"), path("summary.md"), path("report.html"));
+  if (!o_.look.quiet)
+    fmt::print(stderr, "Saved: {} {} {}\n", path("sweep.csv"), path("summary.md"), path("report.html"));
 }
 
 }  // namespace braid

@@ -13,6 +13,7 @@
 #include "renderer/core/hash.h"
 #include "renderer/session/rendering_revision.h"
 #include "tools/options/scene_options.h"
+#include "tools/prepare/scene_identity.h"
 
 namespace braid {
 
@@ -38,6 +39,20 @@ std::string processorName() {
                           path, what, before.dump(), now.dump()));
 }
 
+// What the options choose of every scene, as they were given.
+std::string lookOf(const SceneChoice& c) {
+  std::string text = sceneLook(c, {});
+  const auto add = [&](const std::string& option) { text += (text.empty() ? "" : ", ") + option; };
+  if (!c.environment.empty()) add("--env " + c.environment);
+  if (!c.camera.empty()) add("--camera " + c.camera);
+  if (c.yfovDegrees > 0) add(fmt::format("--yfov {}", c.yfovDegrees));
+  if (c.lookAt) {
+    const glm::dvec3 &eye = c.lookAt->eye, &target = c.lookAt->target;
+    add(fmt::format("--look-at {},{},{},{},{},{}", eye.x, eye.y, eye.z, target.x, target.y, target.z));
+  }
+  return text;
+}
+
 Json finiteOrNull(double v) { return std::isfinite(v) ? Json(v) : Json(); }
 
 }  // namespace
@@ -50,7 +65,8 @@ Json sweepSettings(const SweepOptions& options, const Settings& settings, const 
           {"maxDepth", settings.maxDepth},
           {"sampler", toString(options.sampler)},
           {"threads", options.threads},
-          {"isa", options.isa},
+          {"isa", options.look.isa},
+          {"options", lookOf(options.look)},
           {"cropWorst", options.cropWorst},
           {"metrics", metrics}};
 }
@@ -78,6 +94,7 @@ Json sceneRecord(const SweepScene& scene, const ReferenceFrame& frame) {
           {"file", scene.file},
           {"hash", hexString(frame.sceneHash)},
           {"frame", referenceName(frame)},
+          {"options", frame.look},
           {"planned", scene.planned},
           {"seconds",
            {{"load", scene.loadSeconds},
@@ -98,7 +115,8 @@ Json readRecord(const std::string& path) {
 
 void requireSameSettings(const std::string& path, const Json& before, const Json& now) {
   for (const auto& [name, value] : now.items()) {
-    const Json old = before.contains(name) ? before[name] : Json();
+    // Older folders know nothing of options that came later, and used none.
+    const Json old = before.contains(name) ? before[name] : value.is_string() ? Json("") : Json();
     if (old != value) refuse(path, name, old, value);
   }
 }
@@ -106,7 +124,7 @@ void requireSameSettings(const std::string& path, const Json& before, const Json
 void requireSameScene(const std::string& path, const Json& before, const Json& now) {
   const std::string name = now["name"];
   if (before["frame"] != now["frame"])
-    refuse(path, "another file or camera of the scene " + name + ":", before["frame"], now["frame"]);
+    refuse(path, "another file, camera or light of the scene " + name + ":", before["frame"], now["frame"]);
   if (before["reference"]["hash"] != now["reference"]["hash"])
     refuse(path, "another reference of the scene " + name + ":", before["reference"], now["reference"]);
 }

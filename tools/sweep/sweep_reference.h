@@ -24,10 +24,12 @@ struct ReferenceFrame {
   Mat4 worldToCamera{1}, worldToNdc{1};
   uint64_t sceneHash = 0;
   int maxDepth = 0;
+  std::string look;  // what options change in the file: sceneLook()
 };
-ReferenceFrame referenceFrame(const Scene& scene, const CameraData& camera, const Settings& settings);
+ReferenceFrame referenceFrame(const Scene& scene, const CameraData& camera, const Settings& settings,
+                              const std::string& look = "");
 
-// <scene hash>-<width>x<height>-<camera hash>-<depth>.exr
+// <scene hash>-<width>x<height>-<camera hash>-<depth>.exr; before the ending the hash of the look, if there is any.
 std::string referenceName(const ReferenceFrame& frame);
 
 struct SweepReference {
@@ -58,6 +60,7 @@ struct ReferenceJob {
   const CameraData& camera;
   const Settings& settings;
   const std::vector<const Integrator*>& integrators;
+  std::string look = "";  // as in ReferenceFrame
 };
 
 // Renders a reference and keeps it in the folder; nothing when cancelled.

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // References of `braid sweep`: those that show something else are refused.
+#include <numeric>
+
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
@@ -41,7 +43,7 @@ TEST_CASE("References that show something else are refused with a sentence") {
     return reason;
   };
   CHECK(refusal([](SweepOptions& s) {
-          s.size = {24, 16};
+          s.look.size = {24, 16};
         }) == reference +
                   ": is no reference for this sweep: it has 24x24 pixels, the sweep renders 24x16; give --size 24x24 "
                   "or another reference");
@@ -50,6 +52,30 @@ TEST_CASE("References that show something else are refused with a sentence") {
         std::string::npos);
   CHECK(refusal([](SweepOptions& s) { s.references = {"/nonexistent.exr"}; }).find("no such reference") !=
         std::string::npos);
+}
+
+TEST_CASE("A sweep under other light has a reference of its own and is not mixed with the first one") {
+  const Folder folder;
+  SweepOptions o = smallSweep(folder);
+  o.spp = parseLadder("2", false);
+  o.seeds = 1;
+  REQUIRE(sweep(o) == 0);
+  SweepOptions brighter = o;
+  brighter.look.lightScale = 4;
+  const auto [code, reason] = failureOf([&] { sweep(brighter); });
+  CHECK(code == ExitCode::Usage);
+  CHECK(test::contains(reason, "--light-scale 4"));
+  brighter.output = (folder.path / "brighter").string();
+  REQUIRE(sweep(brighter) == 0);
+  const auto means = [&](const SweepOptions& of) {
+    const auto file = std::filesystem::directory_iterator(of.output + "/references")->path();
+    const Rgb<float> mean = readImage(file.string()).rgb("pt.mean");
+    return std::pair(file.filename().string(), std::accumulate(mean[1].data.begin(), mean[1].data.end(), 0.0));
+  };
+  const auto [nameOfFirst, first] = means(o);
+  const auto [nameOfBrighter, bright] = means(brighter);
+  CHECK(nameOfFirst != nameOfBrighter);
+  CHECK(bright == doctest::Approx(4 * first).epsilon(1e-4));
 }
 
 TEST_CASE("A reference is of one view, of an unbiased estimate and of seeds of its own") {
