@@ -197,6 +197,7 @@ class AutoRun {
   FusedEstimate fused_;
   std::vector<const Estimate*> others_;  // images of other denoisers, and photon maps that are not fused
   std::vector<PixelValues> removed_;     // the fireflies of x as they were
+  std::vector<PixelValues> judging_;     // and as candidates are judged by them
   std::vector<Estimate> filters_, shrunk_;
   MethodResult result_;
 };
@@ -256,6 +257,7 @@ void AutoRun::removeFireflies() {
   if (fireflies.empty()) return;
   if (!fused_.noise.empty()) replaceVariances(fused_.noise, fireflies);
   removed_ = removePixels(changeableX(), fireflies);
+  judging_ = judgingPixels(removed_, fireflies);
 }
 
 // Images of other denoisers go first: the last filter is the careful one, whose image guides the weights.
@@ -280,7 +282,9 @@ void AutoRun::combine() {
   std::vector<const Estimate*> candidates;
   for (const Estimate& e : shrunk_) candidates.push_back(&e);
   for (const Estimate& e : filters_) candidates.push_back(&e);
+  if (!judging_.empty()) swapPixels(changeableX(), judging_);
   const WeightMaps weights = scaleWeights(*x_, candidates, in_.features);
+  if (!judging_.empty()) swapPixels(changeableX(), judging_);
   if (in_.cancelled()) return;
   result_.image = weightedEstimate(weights, candidates);
   std::vector<Plane<float>> maps = channelMeans(weights);

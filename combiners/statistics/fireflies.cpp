@@ -17,7 +17,8 @@ namespace {
 constexpr int kDeviationRadius = 7, kNeighbourRadius = 2;
 constexpr double kDeviationRatio = 8, kSameSurface = 1.5, kQuarterShare = 0.3;
 constexpr int kCommonRadius = 20;
-constexpr double kCommon = 12, kLike = 0.4;  // combiners/EXPERIMENTS.md, Fireflies that are the light
+// combiners/EXPERIMENTS.md, Fireflies that are the light, and Fireflies that judge
+constexpr double kCommon = 12, kCommonToJudge = 3, kLike = 0.4;
 
 double brightness(const Rgb<float>& image, size_t i) {
   return (static_cast<double>(image[0][i]) + static_cast<double>(image[1][i]) + static_cast<double>(image[2][i])) / 3;
@@ -99,8 +100,9 @@ Neighbours neighboursOf(const Rgb<float>& image, const Rgb<float>& variance, con
   return n;
 }
 
-// Keeps of every firefly with like neighbours 1 - kCommon / K, where K fireflies of the same light, or as many as their
-// light amounts to, lie in the window about it. `excess`: what these are brighter than their neighbours, 0 elsewhere.
+// Keeps of every firefly with like neighbours 1 - kCommon / K, or 1 - kCommonToJudge / K, where K fireflies of the same
+// light, or as many as their light amounts to, lie in the window about it. `excess`: what these are brighter than their
+// neighbours, 0 elsewhere.
 void keepCommon(const Plane<float>& excess, std::vector<Firefly>& fireflies) {
   Plane<float> squares = excess;
   for (float& e : squares.data) e *= e;
@@ -111,7 +113,9 @@ void keepCommon(const Plane<float>& excess, std::vector<Firefly>& fireflies) {
     if (!(excess[s.index] > 0)) continue;
     const double sum = kPixels * static_cast<double>(mean[s.index]);
     const double sumOfSquares = kPixels * static_cast<double>(meanSquare[s.index]);
-    s.kept = static_cast<float>(std::max(0.0, 1 - kCommon * sumOfSquares / (sum * sum)));
+    const auto kept = [&](double common) { return std::max(0.0, 1 - common * sumOfSquares / (sum * sum)); };
+    s.kept = static_cast<float>(kept(kCommon));
+    s.keptByJudge = static_cast<float>(kept(kCommonToJudge));
   }
 }
 
@@ -173,6 +177,18 @@ std::vector<PixelValues> removePixels(Estimate& estimate, const std::vector<Fire
   }
   for (Rgb<float>* image : {&estimate.mean, &estimate.half[0], &estimate.half[1]}) replaceValues(*image, fireflies);
   replaceVariances(estimate.variance, fireflies);
+  return before;
+}
+
+std::vector<PixelValues> judgingPixels(std::vector<PixelValues> before, const std::vector<Firefly>& fireflies) {
+  for (size_t k = 0; k < before.size(); ++k) {
+    const Firefly& s = fireflies[k];
+    for (int c = 0; c < 3; ++c) {
+      for (Spectrum* image : {&before[k].mean, &before[k].half[0], &before[k].half[1]})
+        (*image)[c] = drawn((*image)[c], s.value[c], s.keptByJudge);
+      before[k].variance[c] = drawn(before[k].variance[c], s.variance[c], s.keptByJudge);
+    }
+  }
   return before;
 }
 

@@ -9,11 +9,12 @@
 
 namespace braid {
 
-// A pixel that is drawn to other values, and how much of its difference to them it keeps.
+// A pixel that is drawn to other values, and how much of its difference to them it keeps: in what is filtered, and in
+// what images are judged by.
 struct Firefly {
   size_t index = 0;
   Spectrum value{0}, variance{0};
-  float kept = 0;
+  float kept = 0, keptByJudge = 0;
 };
 
 // The fireflies of an unbiased image, before filters spread them over their neighbours (combiners/README.md,
@@ -26,8 +27,9 @@ struct Firefly {
 // Value and variance are replaced by the means of those neighbours, weighted by nearness and by likeness in albedo and
 // normal. The third condition makes fireflies vanish as samples grow: what is there shows in every quarter. Where many
 // share a neighbourhood they are its light: those with features like their neighbours' keep max(0, 1 - 12 / K) of what
-// they exceed these by, with K = (sum e)² / sum e² of the excesses e in 41x41 pixels, the number of like fireflies.
-// With neither quarters nor halves there are none. The estimate has a variance; the features may be null.
+// they exceed these by, with K = (sum e)² / sum e² of the excesses e in 41x41 pixels, the number of like fireflies;
+// where images are judged, over windows of a thousand pixels and more, max(0, 1 - 3 / K). With neither quarters nor
+// halves there are none. The estimate has a variance; the features may be null.
 std::vector<Firefly> findFireflies(const Estimate& estimate, const GivenQuarters& quarters, const Features* features);
 
 // What denoisers read of the estimate, its mean, halves and variance, with the fireflies replaced.
@@ -41,6 +43,8 @@ struct PixelValues {
 
 // Replaces the fireflies of an estimate with halves; returns what was there.
 std::vector<PixelValues> removePixels(Estimate& estimate, const std::vector<Firefly>& fireflies);
+// Of those pixels what images are judged by.
+std::vector<PixelValues> judgingPixels(std::vector<PixelValues> before, const std::vector<Firefly>& fireflies);
 // Exchanges pixels of an estimate with halves and these, so that a second call takes the first one back.
 void swapPixels(Estimate& estimate, std::vector<PixelValues>& pixels);
 
