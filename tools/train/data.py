@@ -5,9 +5,10 @@
     python3 tools/train/data.py FIRST END FOLDER [--braid PROGRAM] [--size WxH] [--target SAMPLES]
 
 Renders three views of each scene from FIRST to before END (tools/train/scenes.py) and writes FOLDER/SCENE_VIEW.npz. A
-view that is there is left alone, so that an interrupted run goes on, and several can share a folder. The target is what
-`auto` makes of the samples named, by bdpt: ten times nearer to the truth than they are, and as bright. Where lamps are
-behind glass it is too dark by `pt`, and so would be whatever learns from it.
+view that is there is left alone, so that an interrupted run goes on, and several can share a folder. The target is the
+mean of the samples named, by bdpt. Where lamps are behind glass pt is too dark, and so would be whatever learns from it.
+Its noise is left in: of noisy targets a network learns their expectation (Lehtinen et al. 2018), and for the seconds of one
+clean target come several scenes. What `auto` makes of them is kept beside it, to say what errors are relative to.
 """
 
 import argparse
@@ -23,7 +24,7 @@ import OpenImageIO as oiio
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 # Of each view one of each group, so that every scene is seen at few and at many samples.
-SAMPLES = ((1, 2), (4, 4, 8), (16, 32))
+SAMPLES = ((1, 2, 4, 4), (8, 16, 8, 32))
 PLANES = 18  # kKpnPlanes
 
 
@@ -73,29 +74,23 @@ class Renderer:
             *scene["options"], *more)
         return out
 
-    def planes(self, image):
-        out = os.path.join(self.folder, "planes.exr")
-        run(self.program, "combine", "--unbiased", image, "--method", "kpn", "--kpn-planes", "1", "--weights", "--float",
-            "-q", "-o", out)
-        return read(out)
-
     def view(self, scene, camera, seed, view):
-        """Planes and target of each number of samples, or None where there is nothing to see."""
-        more = ["--integrator", "bdpt", "--combine", "auto"]
-        target, _ = read(self.render(scene, camera, more, self.target, 7000 + seed, "target.exr"))
-        truth = rgb(target, "")
-        if not worth_seeing(truth):
+        """Planes of each number of samples, the target and what it is relative to; None where there is nothing to see."""
+        target, _ = read(self.render(scene, camera, ["--integrator", "bdpt", "--combine", "auto"], self.target, 7000 + seed,
+                                     "target.exr"))
+        bright = rgb(target, "")
+        if not worth_seeing(bright):
             return None
         arrays, chosen = {}, []
+        planes = ["--integrator", "pt", "--combine", "kpn", "--kpn-planes", "1", "--weights"]
         for group, candidates in enumerate(SAMPLES):
             samples = candidates[(seed + view) % len(candidates)]
-            image = self.render(scene, camera, ["--integrator", "pt", "--combine", "none"], samples, 10 * seed + group,
-                                "image.exr")
-            channels, exposure = self.planes(image)
+            channels, exposure = read(self.render(scene, camera, planes, samples, 10 * seed + group, "planes.exr"))
             arrays[f"x{group}"] = inputs(channels)
             arrays[f"exposure{group}"] = np.float32(exposure)
             chosen.append(samples)
-        return {"target": truth.astype(np.float32), "samples": np.array(chosen), **arrays}
+        return {"target": rgb(target, "bdpt.mean").astype(np.float32), "bright": bright.astype(np.float32),
+                "samples": np.array(chosen), **arrays}
 
 
 def make_views(description, size, target, views, renderer_of):
@@ -134,4 +129,4 @@ def make_views(description, size, target, views, renderer_of):
 
 
 if __name__ == "__main__":
-    make_views(__doc__, "192x128", 64, 3, Renderer)
+    make_views(__doc__, "192x128", 16, 3, Renderer)

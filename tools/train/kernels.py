@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """average() of network.py by kernels.c, where there is a C compiler."""
 
+import concurrent.futures
 import ctypes
 import os
 import shutil
@@ -31,6 +32,18 @@ def compiled():
 LIBRARY = compiled()
 
 
+POOL = concurrent.futures.ThreadPoolExecutor()
+
+
+def each_image(count, call):
+    """call(k) for every image, as many at once as torch has threads; the library lets go of the interpreter."""
+    if torch.get_num_threads() > 1:
+        list(POOL.map(call, range(count)))
+    else:
+        for k in range(count):
+            call(k)
+
+
 def pointer(tensor):
     return ctypes.c_void_p(tensor.data_ptr())
 
@@ -49,8 +62,7 @@ class Average(torch.autograd.Function):
         inputs = [t.contiguous() for t in inputs]
         image = inputs[0]
         out = image.new_empty(image.shape[0], 4, *image.shape[2:])
-        for k in range(image.shape[0]):
-            LIBRARY.average_forward(ctypes.byref(described(*inputs, k)), pointer(out[k]))
+        each_image(image.shape[0], lambda k: LIBRARY.average_forward(ctypes.byref(described(*inputs, k)), pointer(out[k])))
         context.save_for_backward(*inputs, out)
         return out[:, :3]
 
@@ -59,8 +71,9 @@ class Average(torch.autograd.Function):
         *inputs, out = context.saved_tensors
         slope = slope.contiguous()
         gradients = [torch.zeros_like(t) for t in inputs[:3]]
-        constants = torch.zeros(2, dtype=torch.float64)
-        for k in range(slope.shape[0]):
-            LIBRARY.average_backward(ctypes.byref(described(*inputs, k)), pointer(out[k]), pointer(slope[k]),
-                                     *(pointer(g[k]) for g in gradients), pointer(constants))
+        constants = torch.zeros(slope.shape[0], 2, dtype=torch.float64)
+        each_image(slope.shape[0], lambda k: LIBRARY.average_backward(
+            ctypes.byref(described(*inputs, k)), pointer(out[k]), pointer(slope[k]), *(pointer(g[k]) for g in gradients),
+            pointer(constants[k])))
+        constants = constants.sum(0)
         return (*gradients, None, None, constants[0].float(), constants[1].float())
