@@ -130,6 +130,36 @@ TEST_CASE("Of one pass auto takes kpn's image where it runs") {
         1.05 * relativeError(both.find("kpn")->result.image.mean, c.truth));
 }
 
+TEST_CASE("What rays that miss see of the environment stays as sharp as it is, from one pass on") {
+  if (!dynamic_cast<const ExternalMethod&>(*findMethod("kpn")).skipReason().empty()) return;
+  Estimates e = kept(noisyCase(1), {"pt"});
+  Estimate& pt = e.estimates[0];
+  Features& f = *e.features;
+  const int width = pt.mean.width(), horizon = pt.mean.height() / 2;
+  f.depth.mean = Plane<float>(width, pt.mean.height(), 2.0f);
+  const auto sky = [](int x, int y, size_t c) {
+    return ((x / 2 + y / 2) % 2 ? 3.0f : 0.4f) + 0.1f * static_cast<float>(c);
+  };
+  for (int y = 0; y < horizon; ++y)
+    for (int x = 0; x < width; ++x) {
+      const size_t i = pt.mean[0].index(x, y);
+      f.depth.mean[i] = 0;
+      for (size_t c = 0; c < 3; ++c) f.albedo.mean[c][i] = pt.mean[c][i] = sky(x, y, c);
+    }
+  const Rgb<float> image = outputOf(e, "auto").result.image.mean;
+  float largest = 0, changed = 0;
+  for (int y = 0; y < pt.mean.height(); ++y)
+    for (int x = 0; x < width; ++x)
+      for (size_t c = 0; c < 3; ++c) {
+        const size_t i = pt.mean[0].index(x, y);
+        const float difference = std::abs(image[c][i] - pt.mean[c][i]);
+        float& most = y < horizon ? largest : changed;
+        most = std::max(most, difference);
+      }
+  CHECK(largest < 1e-3f);
+  CHECK(changed > 0.01f);
+}
+
 TEST_CASE("kpn helps auto from few samples, and its image is kept only where it is asked for") {
   if (!dynamic_cast<const ExternalMethod&>(*findMethod("kpn")).skipReason().empty()) return;
   const auto planOf = [](uint64_t passes, const std::vector<std::string>& wanted, const CombinePlanOptions& options) {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kernel prediction: a network chooses how far each pixel averages its neighbours, at several scales.
+#include <cmath>
+
 #include <fmt/format.h>
 
 #include "combiners/denoise/kpn/kpn_network.h"
@@ -16,6 +18,8 @@ namespace braid {
 namespace {
 
 const OptionInfo kPlanes{"kpn-planes", 0, "1: the image stays as it is; --weights writes what the network would read"};
+
+constexpr float kSameRadiance = 2e-3f;  // relative, for features in half precision
 
 // With halves of their own weights, but features and variances of all samples, like those of pw.
 class Kpn : public ExternalMethod {
@@ -53,6 +57,22 @@ MethodResult planesOf(const MethodInputs& in, KpnPlanes planes) {
   return result;
 }
 
+// Where rays miss, the albedo is the environment that they see, sample by sample. Such pixels have no noise and stay as
+// they are, for averages can only blur them. `albedo`: of the same samples as the image.
+void keepMisses(Rgb<float>& out, const Rgb<float>& image, const Rgb<float>& albedo, const MethodInputs& in) {
+  const Plane<float>& depth = in.features->depth.mean;
+  if (depth.empty() || albedo.empty() || out.empty()) return;
+  const auto exposure = static_cast<float>(in.options.number(kPipelineExposure));
+  for (size_t i = 0; i < image.size(); ++i) {
+    bool seen = depth[i] == 0;
+    for (size_t c = 0; c < 3 && seen; ++c) {
+      const float sky = exposure * albedo[c][i];
+      seen = sky > 0 && std::abs(image[c][i] - sky) <= kSameRadiance * sky;
+    }
+    for (size_t c = 0; c < 3 && seen; ++c) out[c][i] = image[c][i];
+  }
+}
+
 MethodResult Kpn::run(const MethodInputs& in) const {
   const Estimate& e = *in.unbiased;
   const KpnScene scene{in.features, regularisedVariance(e), in.firstPass ? 1 : e.passes};
@@ -65,9 +85,12 @@ MethodResult Kpn::run(const MethodInputs& in) const {
   KpnNetwork network(findNetwork(name()), *library);
   MethodResult result;
   result.image.mean = network.denoise(kpnPlanes(e.mean, scene, false), in.cancel);
+  if (in.features) keepMisses(result.image.mean, e.mean, in.features->albedo.mean, in);
   for (int h = 0; h < 2; ++h)
-    if (!in.meanOnly && !e.half[h].empty() && !in.cancelled())
+    if (!in.meanOnly && !e.half[h].empty() && !in.cancelled()) {
       result.image.half[h] = network.denoise(kpnPlanes(e.half[h], scene, true), in.cancel);
+      if (in.features) keepMisses(result.image.half[h], e.half[h], in.features->albedo.half[h], in);
+    }
   return result;
 }
 
