@@ -16,6 +16,15 @@ namespace braid::test_network_memory {
 
 using namespace test;
 
+namespace {
+
+// Of what is stated for a thread, what processors without AVX-512 leave: there the library takes no scratch.
+double leftScratch() { return oneDnn()->block() < 16 ? static_cast<double>(kConvolutionScratch) : 0; }
+// And its blocks of 8 channels hold fewer zeros than those of 16.
+double leftOfTiles() { return oneDnn()->block() < 16 ? static_cast<double>(kTileBytes) / 16 : 0; }
+
+}  // namespace
+
 TEST_CASE("A network takes the memory that it says, whatever the image") {
   const ConvolutionLibrary* library = oneDnn();
   if (!library) return;
@@ -30,7 +39,7 @@ TEST_CASE("A network takes the memory that it says, whatever the image") {
     const double peak = static_cast<double>(heapPeak() - before) - static_cast<double>(out.values.size() * 4);
     const auto each = static_cast<double>(tiled.threadBytes(image.width, image.height));
     INFO(threads, " threads: ", peak / each);
-    CHECK(peak > 0.9 * each);
+    CHECK(peak > 0.9 * (each - leftScratch()));
     CHECK(peak < 1.1 * threads * each);
   }
   CHECK(tiled.threadBytes(8192, 8192) < (size_t(32) << 20) + kConvolutionScratch);
@@ -86,7 +95,7 @@ TEST_CASE("Methods with networks of their own take no more memory than they stat
       const auto peak = static_cast<double>(heapPeak() - before);
       INFO(method->name(), " on ", threads, " threads: ", (peak - each) / pixels, " bytes a pixel");
       CHECK(peak < 1.1 * (pixels * stated.peak + threads * each));
-      CHECK(peak > 0.7 * (pixels * stated.peak + each));
+      CHECK(peak > 0.7 * (pixels * stated.peak + each - leftScratch() - leftOfTiles()));
       CHECK(static_cast<double>(heapBytes() - before) == doctest::Approx(pixels * stated.kept).epsilon(0.1));
     }
   }
