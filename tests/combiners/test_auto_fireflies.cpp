@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <numeric>
 #include <random>
 
 #include <doctest/doctest.h>
@@ -148,37 +147,6 @@ TEST_CASE("What images are judged by and what is filtered are exchanged, and exc
   swapPixels(x, judging);
   CHECK(x.mean[1][at] == 1);
   CHECK(x.variance[1][at] == doctest::Approx(1e-4));
-}
-
-TEST_CASE("Light that few samples find speaks for the image that shows it") {
-  // One sample in 500 finds two fifths of the light. Filters lose them; another denoiser shows all.
-  Estimate x = flat(0.6f, 0.09f), bright = flat(1.0f, 0);
-  std::mt19937 random(7);
-  std::exponential_distribution<float> common(1 / 0.6f);
-  std::bernoulli_distribution rare(1.0 / 500);
-  for (size_t i = 0; i < x.mean.size(); ++i) {
-    std::array<float, 4> quarters{};
-    for (float& q : quarters) q = common(random) + (rare(random) ? 200.0f : 0.0f);
-    const float mean = (quarters[0] + quarters[1] + quarters[2] + quarters[3]) / 4;
-    setPixel(x, i, mean, quarters, mean > 40 ? 2500.0f : 0.09f);
-  }
-  x.passes = 4;
-  bright.name = "other";
-  Features alike;
-  for (FeaturePlanes<Rgb<float>>* f : {&alike.albedo, &alike.normal}) {
-    f->mean = Rgb<float>(40, 30, 0.5f);
-    f->half[0] = f->half[1] = f->mean;
-  }
-  MethodInputs in;
-  in.unbiased = &x;
-  in.bases = {&bright};
-  in.features = &alike;
-  in.quarters = {&x.quarter};
-  in.options.set("auto-lost-light", 0);
-  const Rgb<float> image = findMethod("auto")->run(in).image.mean;
-  const double mean = std::accumulate(image[1].data.begin(), image[1].data.end(), 0.0) / 1200;
-  CHECK(mean > 0.85);
-  CHECK(mean < 1.1);
 }
 
 TEST_CASE("A firefly in one quarter leaves nothing in its neighbours either") {
