@@ -28,8 +28,7 @@ struct Firefly {
 // normal. The third condition makes fireflies vanish as samples grow: what is there shows in every quarter. Where many
 // share a neighbourhood they are its light: those with features like their neighbours' keep max(0, 1 - 12 / K) of what
 // they exceed these by, with K = (sum e)² / sum e² of the excesses e in 41x41 pixels, the number of like fireflies;
-// where images are judged, over windows of a thousand pixels and more, max(0, 1 - 3 / K). With neither quarters nor
-// halves there are none. The estimate has a variance; the features may be null.
+// where images are judged max(0, 1 - 3 / K). Without halves there are none. The features may be null.
 std::vector<Firefly> findFireflies(const Estimate& estimate, const GivenQuarters& quarters, const Features* features);
 
 // What denoisers read of the estimate, its mean, halves and variance, with the fireflies replaced.
