@@ -51,9 +51,9 @@ void addCells(CLI::App& command, SweepOptions& o) {
 }
 
 // The same for every scene.
-void addLook(CLI::App& command, SweepOptions& o) {
-  addSize(command, o.look.size);
-  addSceneLook(command, o.look);
+void addView(CLI::App& command, SweepOptions& o) {
+  addSize(command, o.view.size);
+  addSceneViewOptions(command, o.view);
   showFirst(command, kSceneHelp, {"--size", "--camera", "--look-at", "--env"});
 }
 
@@ -83,7 +83,7 @@ void addMeasurements(CLI::App& command, SweepOptions& o) {
       ->capture_default_str()
       ->check(number(0.01, 1e6));
   command.add_flag("--no-plots", o.noPlots, "Do not run gnuplot");
-  command.add_flag("-q,--quiet", o.look.quiet, "Errors only");
+  command.add_flag("-q,--quiet", o.view.quiet, "Errors only");
   showFirst(command, "Measurement", {"--metric", "--max-depth", "--threads", "--no-plots", "--quiet"});
 }
 
@@ -105,7 +105,7 @@ void addSweep(CLI::App& app, Action& action) {
   const auto options = std::make_shared<SweepOptions>();
   CLI::App* command = app.add_subcommand("sweep", "Error against samples and time: scenes x methods x ladder x seeds");
   addCells(*command, *options);
-  addLook(*command, *options);
+  addView(*command, *options);
   addReferences(*command, *options);
   addMeasurements(*command, *options);
   command->footer(kSweepHints);

@@ -143,7 +143,7 @@ CLI::Option* addIsa(CLI::App& command, std::string& isa) {
       ->type_name("NAME");
 }
 
-void addSceneLook(CLI::App& command, SceneChoice& c) {
+void addSceneViewOptions(CLI::App& command, SceneChoice& c) {
   addViewOptions(command, c);
   addFrameOptions(command, c);
   addLightOptions(command, c);
@@ -155,7 +155,7 @@ void addSceneOptions(CLI::App& command, SceneChoice& c) {
   addSize(command, c.size, "Full frame in pixels");
   addParsed(command, "--crop", c.crop, parseWindow, "Only this part of the frame: upper left origin, ends excluded")
       ->type_name("x0,y0,x1,y1");
-  addSceneLook(command, c);
+  addSceneViewOptions(command, c);
   command.add_flag("-q,--quiet", c.quiet, "Errors only");
   command.add_flag("-v,--verbose", c.verbose, "Also print the plan");
   showFirst(command, kSceneHelp, {"--size", "--crop", "--camera", "--look-at", "--env"});

@@ -43,7 +43,7 @@ struct SceneChoice {
 };
 void addSceneOptions(CLI::App& command, SceneChoice& choice);
 // Those of them that any number of scenes can have in common: camera, pose, light, reading.
-void addSceneLook(CLI::App& command, SceneChoice& choice);
+void addSceneViewOptions(CLI::App& command, SceneChoice& choice);
 
 struct SampleChoice {
   std::vector<std::string> integrators{"pt"};

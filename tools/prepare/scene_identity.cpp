@@ -50,7 +50,7 @@ std::vector<StateOption> sceneIdentity(const SceneChoice& c, const SceneData& da
           {"--focus", focusText(c)}};
 }
 
-std::string sceneLook(const SceneChoice& c, const SceneData& data) {
+std::string changedOptions(const SceneChoice& c, const SceneData& data) {
   const std::vector<StateOption> usual = sceneIdentity({}, data);
   std::vector<StateOption> chosen = sceneIdentity(c, data);
   std::erase_if(chosen, [&](const StateOption& o) { return std::find(usual.begin(), usual.end(), o) != usual.end(); });

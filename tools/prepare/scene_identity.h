@@ -14,6 +14,6 @@ namespace braid {
 std::vector<StateOption> sceneIdentity(const SceneChoice& choice, const SceneData& data);
 
 // Those options and the background where they are not the default ones, as "--env 4x2:0123, --light-scale 2".
-std::string sceneLook(const SceneChoice& choice, const SceneData& data);
+std::string changedOptions(const SceneChoice& choice, const SceneData& data);
 
 }  // namespace braid

@@ -77,7 +77,7 @@ Sweep::Sweep(const SweepOptions& options, MethodsOf methods, const std::vector<c
       integrators_(integrators),
       names_(sceneNames(options.scenes)),
       folder_(options, measurement_, [this](const std::string& text) { warn(text); }),
-      progress_(options.look.quiet),
+      progress_(options.view.quiet),
       interrupted_(installInterruptHandler()) {
   SampleChoice samples;
   samples.sampler = o_.sampler;
@@ -92,7 +92,7 @@ Sweep::Sweep(const SweepOptions& options, MethodsOf methods, const std::vector<c
 }
 
 SceneChoice Sweep::choiceOf(const std::string& file) const {
-  SceneChoice choice = o_.look;
+  SceneChoice choice = o_.view;
   choice.file = file;
   return choice;
 }
@@ -142,7 +142,7 @@ bool Sweep::renderReference(SweepScene& scene, const std::string& integrator) {
   progress_.expect(total, 0);
   progress_.begin(scene.name + " reference", total, 0);
   std::optional<SweepReference> reference = braid::renderReference(
-      folder_.path("references"), {*scene.scene, scene.camera, settings, integrators_, scene.look},
+      folder_.path("references"), {*scene.scene, scene.camera, settings, integrators_, scene.options},
       [&](const Progress& p) {
         progress_.update(static_cast<double>(p.round), 0, fmt::format("{}/{} spp", p.round, p.rounds));
         return true;
@@ -155,7 +155,7 @@ bool Sweep::renderReference(SweepScene& scene, const std::string& integrator) {
 }
 
 bool Sweep::findReference(SweepScene& scene) {
-  const ReferenceFrame frame = referenceFrame(*scene.scene, scene.camera, settings_, scene.look);
+  const ReferenceFrame frame = referenceFrame(*scene.scene, scene.camera, settings_, scene.options);
   const std::string file = valueForScene(o_.references, scene.name, "");
   std::string integrator = valueForScene(o_.referenceIntegrators, scene.name, "pt");
   if (integrator == "auto") integrator = scene.planned.find("sppm") == std::string::npos ? "pt" : "vcm";
@@ -256,12 +256,12 @@ bool Sweep::runScene(size_t index) {
   scene.loadSeconds = opened.loadSeconds;
   scene.camera = opened.camera;
   scene.scene = std::move(opened.scene);
-  scene.look = sceneLook(choice, scene.scene->data());
+  scene.options = changedOptions(choice, scene.scene->data());
   scene.planned = plannedIntegrators(scene, settings_, integrators_);
   methods_ = methodsOf_(scene.planned);
   const std::vector<SweepJob> jobs = jobsOf(scene.name);
   if (!findReference(scene)) return false;
-  folder_.record(scene, referenceFrame(*scene.scene, scene.camera, settings_, scene.look));
+  folder_.record(scene, referenceFrame(*scene.scene, scene.camera, settings_, scene.options));
   warmUp(scene, jobs.front());
   for (const SweepJob& job : jobs)
     if (!runJob(scene, job)) return false;
@@ -272,7 +272,7 @@ bool Sweep::runScene(size_t index) {
 
 void Sweep::warn(const std::string& text) {
   progress_.breakLine();
-  if (!o_.look.quiet) fmt::print(stderr, "warning: {}\n", text);
+  if (!o_.view.quiet) fmt::print(stderr, "warning: {}\n", text);
 }
 
 bool Sweep::reportFailures() const {

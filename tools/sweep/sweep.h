@@ -20,7 +20,7 @@ namespace braid {
 
 struct SweepOptions {
   std::vector<std::string> scenes;                      // files
-  SceneChoice look;                                     // of every scene: all but its file, size of the frame included
+  SceneChoice view;                                     // of every scene: all but its file, size of the frame included
   std::string output;                                   // folder
   std::string preset;                                   // its name, empty: none; already applied
   std::vector<double> spp, time;                        // rungs of the ladders, rising; both empty: 4:256 samples
@@ -37,7 +37,7 @@ struct SweepOptions {
   double commandTimeout = 600;  // seconds that one run of an external command may take
   bool noPlots = false;
 
-  SweepOptions() { look.size = {640, 360}; }
+  SweepOptions() { view.size = {640, 360}; }
 };
 
 // The rungs that "FROM:TO" (doubling), "A,B,C" or one number stand for, increasing. With `durations` items may have

@@ -121,7 +121,7 @@ void SweepFolder::finish(const std::vector<std::string>& scenes, const std::vect
   writeRecord();
   for (const std::string& line : writeSweepReport(o_.output, table_, summary, record_, !o_.noPlots)) warn_(line);
   out << toMarkdown(summary);
-  if (!o_.look.quiet)
+  if (!o_.view.quiet)
     fmt::print(stderr, "Saved: {} {} {}\n", path("sweep.csv"), path("summary.md"), path("report.html"));
 }
 

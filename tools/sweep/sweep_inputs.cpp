@@ -72,6 +72,8 @@ void checkSweepInputs(const SweepOptions& o, const std::vector<std::string>& nam
   checkFixedImages(o, methods, rungs);
   for (const std::string& file : o.scenes)
     if (!fs::exists(file)) throw Error(ExitCode::BadInput, file + ": no such file");
+  if (const std::string& file = o.view.environment; !file.empty() && !fs::exists(file))
+    throw Error(ExitCode::BadInput, file + ": no such environment");
   checkReferences(o, names, integrators);
 }
 
@@ -80,7 +82,8 @@ void checkSweepOutputs(const SweepOptions& o, const std::vector<std::string>& na
   for (const char* name : {"sweep.csv", "sweep.json", "summary.md", "report.html"})
     uses.output("-o", o.output + "/" + name);
   std::vector<std::string> inputs = o.scenes;
-  for (const std::string& file : o.scenes) uses.scene(file, "");
+  for (const std::string& file : o.scenes) uses.scene(file, o.view.environment);
+  if (!o.view.environment.empty()) inputs.push_back(o.view.environment);
   for (const std::string& name : names)
     if (const std::string file = valueForScene(o.references, name, ""); !file.empty()) {
       uses.input("a reference", file);

@@ -16,7 +16,7 @@ void applyPreset(const std::string& preset, const std::set<std::string>& given, 
   };
   fill("--methods", o.methods, paperMethods());
   if (!given.count("--time")) fill("--spp", o.spp, parseLadder("8:128", false));
-  fill("--size", o.look.size, FrameSize{192, 108});
+  fill("--size", o.view.size, FrameSize{192, 108});
   fill("--seeds", o.seeds, 2);
   fill("--metric", o.metrics, std::vector<std::string>{"relL2", "SMAPE", "DSSIM"});
   fill("--reference-integrator", o.referenceIntegrators, std::vector<std::string>{"auto"});

@@ -40,8 +40,8 @@ std::string processorName() {
 }
 
 // What the options choose of every scene, as they were given.
-std::string lookOf(const SceneChoice& c) {
-  std::string text = sceneLook(c, {});
+std::string optionsText(const SceneChoice& c) {
+  std::string text = changedOptions(c, {});
   const auto add = [&](const std::string& option) { text += (text.empty() ? "" : ", ") + option; };
   if (!c.environment.empty()) add("--env " + c.environment);
   if (!c.camera.empty()) add("--camera " + c.camera);
@@ -65,8 +65,8 @@ Json sweepSettings(const SweepOptions& options, const Settings& settings, const 
           {"maxDepth", settings.maxDepth},
           {"sampler", toString(options.sampler)},
           {"threads", options.threads},
-          {"isa", options.look.isa},
-          {"options", lookOf(options.look)},
+          {"isa", options.view.isa},
+          {"options", optionsText(options.view)},
           {"cropWorst", options.cropWorst},
           {"metrics", metrics}};
 }
@@ -94,7 +94,7 @@ Json sceneRecord(const SweepScene& scene, const ReferenceFrame& frame) {
           {"file", scene.file},
           {"hash", hexString(frame.sceneHash)},
           {"frame", referenceName(frame)},
-          {"options", frame.look},
+          {"options", frame.options},
           {"planned", scene.planned},
           {"seconds",
            {{"load", scene.loadSeconds},

@@ -113,27 +113,23 @@ ImageFile readChecked(const std::string& path, const ReferenceFrame& frame, uint
 }  // namespace
 
 ReferenceFrame referenceFrame(const Scene& scene, const CameraData& camera, const Settings& settings,
-                              const std::string& look) {
+                              const std::string& options) {
   const Camera view(camera, settings.width, settings.height);
   const glm::dvec3& origin = scene.data().origin;
-  return {settings.width,
-          settings.height,
-          view.worldToCamera(origin),
-          view.worldToNdc(origin),
-          scene.data().contentHash,
-          settings.maxDepth,
-          look};
+  return {
+      settings.width,    settings.height, view.worldToCamera(origin), view.worldToNdc(origin), scene.data().contentHash,
+      settings.maxDepth, options};
 }
 
 std::string referenceName(const ReferenceFrame& frame) {
   ContentHash camera;
   camera.add(&frame.worldToCamera, sizeof(Mat4));
   camera.add(&frame.worldToNdc, sizeof(Mat4));
-  ContentHash look;
-  look.add(frame.look.data(), frame.look.size());
+  ContentHash options;
+  options.add(frame.options.data(), frame.options.size());
   return fmt::format("{}-{}x{}-{}-{}{}.exr", hexString(frame.sceneHash), frame.width, frame.height,
                      hexString(camera.value()), frame.maxDepth,
-                     frame.look.empty() ? "" : "-" + hexString(look.value()));
+                     frame.options.empty() ? "" : "-" + hexString(options.value()));
 }
 
 SweepReference readReference(const std::string& path, const ReferenceFrame& frame, const std::string& integrator,
@@ -175,7 +171,7 @@ std::optional<SweepReference> renderReference(const std::string& folder, const R
   ExrOptions exr;
   exr.floatHeadline = true;
   SweepReference reference;
-  reference.file = folder + "/" + referenceName(referenceFrame(scene, job.camera, settings, job.look));
+  reference.file = folder + "/" + referenceName(referenceFrame(scene, job.camera, settings, job.options));
   writeExr(reference.file, estimates, result.image, nullptr, exr);
   const Estimate& e = estimates.estimates.front();
   reference.image = {e.mean, {e.half[0], e.half[1]}};

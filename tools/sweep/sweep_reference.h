@@ -24,12 +24,12 @@ struct ReferenceFrame {
   Mat4 worldToCamera{1}, worldToNdc{1};
   uint64_t sceneHash = 0;
   int maxDepth = 0;
-  std::string look;  // what options change in the file: sceneLook()
+  std::string options;  // what options change in the file: changedOptions()
 };
 ReferenceFrame referenceFrame(const Scene& scene, const CameraData& camera, const Settings& settings,
-                              const std::string& look = "");
+                              const std::string& options = "");
 
-// <scene hash>-<width>x<height>-<camera hash>-<depth>.exr; before the ending the hash of the look, if there is any.
+// <scene hash>-<width>x<height>-<camera hash>-<depth>.exr; before the ending the hash of the options, if there are any.
 std::string referenceName(const ReferenceFrame& frame);
 
 struct SweepReference {
@@ -60,7 +60,7 @@ struct ReferenceJob {
   const CameraData& camera;
   const Settings& settings;
   const std::vector<const Integrator*>& integrators;
-  std::string look = "";  // as in ReferenceFrame
+  std::string options = "";  // as in ReferenceFrame
 };
 
 // Renders a reference and keeps it in the folder; nothing when cancelled.

@@ -39,7 +39,7 @@ struct SweepScene {
   std::string name, file;
   std::unique_ptr<Scene> scene;
   CameraData camera;
-  std::string look;     // what options change in the file: sceneLook()
+  std::string options;  // what options change in the file: changedOptions()
   std::string planned;  // the integrators that `auto` keeps for it, joined by '+'
   SweepReference reference;
   double loadSeconds = 0;

@@ -23,11 +23,11 @@ inline SweepOptions smallSweep(const Folder& folder) {
   o.spp = parseLadder("4:16", false);
   o.seeds = 2;
   o.referenceSpp = 64;
-  o.look.size = {24, 24};
+  o.view.size = {24, 24};
   o.sampler = SamplerKind::Independent;
   o.maxDepth = 5;
   o.noPlots = true;
-  o.look.quiet = true;
+  o.view.quiet = true;
   return o;
 }
 

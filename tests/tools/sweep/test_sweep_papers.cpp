@@ -196,7 +196,7 @@ TEST_CASE("The preset fills in what was not given, and every method of it can ru
   o.spp = parseLadder("4", false);
   applyPreset("papers", {"--spp"}, o);
   CHECK(o.spp == std::vector<double>{4});
-  CHECK((o.look.size == FrameSize{192, 108}));
+  CHECK((o.view.size == FrameSize{192, 108}));
   CHECK(o.methods == paperMethods());
   const auto integrators = makeIntegrators();
   CHECK(sweepMethods(o.methods, pointersTo(integrators)).size() == o.methods.size());
@@ -206,9 +206,9 @@ TEST_CASE("The preset fills in what was not given, and every method of it can ru
   o.scenes = {test::sourcePath("scenes/cornell.glb")};
   o.output = (folder.path / "sweep").string();
   o.spp = parseLadder("8,32,64", false);
-  o.look.size = {16, 12};
+  o.view.size = {16, 12};
   o.referenceSpp = 64;
-  o.noPlots = o.look.quiet = true;
+  o.noPlots = o.view.quiet = true;
   std::ostringstream out;
   REQUIRE(runSweep(o, out) == 0);
   std::ifstream in(o.output + "/summary.md");

@@ -43,7 +43,7 @@ TEST_CASE("References that show something else are refused with a sentence") {
     return reason;
   };
   CHECK(refusal([](SweepOptions& s) {
-          s.look.size = {24, 16};
+          s.view.size = {24, 16};
         }) == reference +
                   ": is no reference for this sweep: it has 24x24 pixels, the sweep renders 24x16; give --size 24x24 "
                   "or another reference");
@@ -61,10 +61,13 @@ TEST_CASE("A sweep under other light has a reference of its own and is not mixed
   o.seeds = 1;
   REQUIRE(sweep(o) == 0);
   SweepOptions brighter = o;
-  brighter.look.lightScale = 4;
+  brighter.view.lightScale = 4;
   const auto [code, reason] = failureOf([&] { sweep(brighter); });
   CHECK(code == ExitCode::Usage);
   CHECK(test::contains(reason, "--light-scale 4"));
+  SweepOptions absent = o;
+  absent.view.environment = "/nonexistent.hdr";
+  CHECK(failureOf([&] { sweep(absent); }).second == "/nonexistent.hdr: no such environment");
   brighter.output = (folder.path / "brighter").string();
   REQUIRE(sweep(brighter) == 0);
   const auto means = [&](const SweepOptions& of) {
