@@ -15,16 +15,24 @@ namespace {
 constexpr int kAround = 4;           // radius in pixels of the geometric mean about a pixel
 constexpr double kOwnOffset = 0.01;  // of logarithms, so that black counts as dark
 constexpr double kAroundOffset = 0.03;
+constexpr int kNear = 2;         // radius in pixels of what about a pixel both halves show
+constexpr double kMostRoot = 3;  // times that of all samples
 
-double brightness(const Estimate& e, size_t i) {
+using ImageOf = const Rgb<float>& (*)(const Estimate&);
+
+double brightness(const Rgb<float>& image, size_t i) {
   const double sum =
-      static_cast<double>(e.mean[0][i]) + static_cast<double>(e.mean[1][i]) + static_cast<double>(e.mean[2][i]);
+      static_cast<double>(image[0][i]) + static_cast<double>(image[1][i]) + static_cast<double>(image[2][i]);
   return std::max(0.0, sum / 3);
 }
 
-}  // namespace
+double root(float level) {
+  const double l = static_cast<double>(level);
+  return 1 / std::sqrt(l * l + 0.01);
+}
 
-Plane<float> commonErrorRoots(const std::vector<const Estimate*>& candidates) {
+// The level of one image of every candidate.
+Plane<float> commonLevel(const std::vector<const Estimate*>& candidates, ImageOf imageOf) {
   const int width = candidates[0]->mean.width(), height = candidates[0]->mean.height();
   const double count = static_cast<double>(candidates.size());
   Plane<float> own(width, height, kUnfilled), mean(width, height, kUnfilled), logarithm(width, height, kUnfilled);
@@ -32,7 +40,7 @@ Plane<float> commonErrorRoots(const std::vector<const Estimate*>& candidates) {
     for (size_t i = begin; i < end; ++i) {
       double sum = 0, logs = 0;
       for (const Estimate* e : candidates) {
-        const double b = brightness(*e, i);
+        const double b = brightness(imageOf(*e), i);
         sum += b;
         logs += std::log(b + kOwnOffset);
       }
@@ -45,11 +53,27 @@ Plane<float> commonErrorRoots(const std::vector<const Estimate*>& candidates) {
   parallelChunks(own.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const double geometric = std::exp(static_cast<double>(around[i])) - kAroundOffset;
-      const double level = std::max(static_cast<double>(own[i]), std::min(static_cast<double>(near[i]), geometric));
-      own[i] = finiteFloat(1 / std::sqrt(level * level + 0.01));
+      own[i] = std::max(own[i], std::min(near[i], finiteFloat(geometric)));
     }
   });
   return own;
+}
+
+}  // namespace
+
+Plane<float> commonErrorRoots(const std::vector<const Estimate*>& candidates) {
+  Plane<float> level = commonLevel(candidates, [](const Estimate& e) -> const Rgb<float>& { return e.mean; });
+  const Plane<float> a = commonLevel(candidates, [](const Estimate& e) -> const Rgb<float>& { return e.half[0]; });
+  const Plane<float> b = commonLevel(candidates, [](const Estimate& e) -> const Rgb<float>& { return e.half[1]; });
+  const Plane<float> aboutA = boxMean<float>(a, kNear), aboutB = boxMean<float>(b, kNear);
+  parallelChunks(level.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      const float about = std::min({level[i], aboutA[i], aboutB[i]});
+      const double ofBoth = root(std::max(about, std::min(a[i], b[i])));
+      level[i] = static_cast<float>(std::min(ofBoth, kMostRoot * root(level[i])));
+    }
+  });
+  return level;
 }
 
 }  // namespace braid

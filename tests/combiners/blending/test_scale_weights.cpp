@@ -9,6 +9,7 @@
 #include "combiners/ensemble/scale_weights.h"
 #include "combiners/ensemble/scales/block_errors.h"
 #include "combiners/ensemble/scales/error_scale.h"
+#include "combiners/pixels/box_mean.h"
 
 namespace braid::test_scale_weights {
 
@@ -95,12 +96,66 @@ TEST_CASE("The common brightness: a lamp's own, and the dark beside it") {
   Estimate e;
   e.mean = Rgb<float>(21, 21, 0.02f);
   for (size_t c = 0; c < 3; ++c) e.mean[c].at(10, 10) = 100;
+  e.half[0] = e.half[1] = e.mean;
   Estimate leak = e;
-  for (size_t c = 0; c < 3; ++c) leak.mean[c].at(11, 10) = 2;
+  for (Rgb<float>* image : {&leak.mean, &leak.half[0], &leak.half[1]})
+    for (size_t c = 0; c < 3; ++c) (*image)[c].at(11, 10) = 2;
   const Plane<float> roots = commonErrorRoots({&e, &leak});
   CHECK(roots.at(10, 10) == doctest::Approx(0.01).epsilon(0.01));  // 1 / 100
   CHECK(1 / roots.at(12, 10) < 0.15f);                             // not that of the lamp, two pixels off
   CHECK(1 / roots.at(11, 10) < 0.3f);                              // of 0.02 and 2: what leaks counts
+}
+
+TEST_CASE(
+    "The common brightness of a pixel beside a lamp, bright by chance in one half, is no less than what is about it") {
+  // The lamp fills the columns from 11 on; the pixel is of the lamp in one half and of the wall in the other.
+  Estimate e;
+  e.mean = e.half[0] = e.half[1] = Rgb<float>(21, 21, 0.2f);
+  for (size_t c = 0; c < 3; ++c) {
+    for (Rgb<float>* image : {&e.mean, &e.half[0], &e.half[1]})
+      for (int y = 0; y < 21; ++y)
+        for (int x = 11; x < 21; ++x) (*image)[c].at(x, y) = 10;
+    e.half[1][c].at(10, 10) = 10;
+    e.mean[c].at(10, 10) = 5.1f;
+  }
+  CHECK(1 / commonErrorRoots({&e}).at(10, 10) > 2.5f);
+}
+
+TEST_CASE("The common brightness does not rise where one half alone is bright, but no root is more than tripled") {
+  Estimate e;
+  e.mean = e.half[0] = e.half[1] = Rgb<float>(21, 21, 0.3f);
+  const float before = commonErrorRoots({&e}).at(10, 10);
+  const auto withBright = [&](float value) {
+    for (size_t c = 0; c < 3; ++c) {
+      e.half[1][c].at(10, 10) = value;
+      e.mean[c].at(10, 10) = 0.5f * (0.3f + value);
+    }
+    return commonErrorRoots({&e}).at(10, 10);
+  };
+  CHECK(withBright(0.6f) == doctest::Approx(before).epsilon(1e-4));
+  CHECK(withBright(9.7f) == doctest::Approx(3 / 5.0).epsilon(1e-3));
+}
+
+TEST_CASE("An image that lacks the light of rare samples does not win") {
+  // The samples are 0, or rarely 50. What a filter has left of them is too dark, but bright about those that it met.
+  const int width = 160, height = 96;
+  const Estimate good = noisy(width, height, flat, 0.01, 2);
+  for (uint32_t seed = 10; seed < 14; ++seed) {
+    const Estimate x = withFireflies(width, height, 0.02, seed);
+    Estimate dark = x;
+    for (size_t c = 0; c < 3; ++c) {
+      for (Rgb<float>& half : dark.half) {
+        half[c] = boxMean<float>(half[c], 1);
+        for (float& v : half[c].data) v = 0.3f + 0.35f * v;
+      }
+      for (size_t i = 0; i < x.mean.size(); ++i) dark.mean[c][i] = 0.5f * (dark.half[0][c][i] + dark.half[1][c][i]);
+    }
+    const WeightMaps w = scaleWeights(x, {&good, &dark}, nullptr);
+    double mean = 0;
+    for (const float v : w.of(0, 0).data) mean += static_cast<double>(v) / (width * height);
+    CAPTURE(seed);
+    CHECK(mean > 0.8);
+  }
 }
 
 TEST_CASE("Without noise windows decide, under heavy noise the whole image does") {
