@@ -18,7 +18,7 @@ constexpr double kAroundOffset = 0.03;
 constexpr int kNear = 2;         // radius in pixels of what about a pixel both halves show
 constexpr double kMostRoot = 3;  // times that of all samples
 
-using ImageOf = const Rgb<float>& (*)(const Estimate&);
+using Images = std::vector<const Rgb<float>*>;
 
 double brightness(const Rgb<float>& image, size_t i) {
   const double sum =
@@ -32,15 +32,15 @@ double root(float level) {
 }
 
 // The level of one image of every candidate.
-Plane<float> commonLevel(const std::vector<const Estimate*>& candidates, ImageOf imageOf) {
-  const int width = candidates[0]->mean.width(), height = candidates[0]->mean.height();
-  const double count = static_cast<double>(candidates.size());
+Plane<float> commonLevel(const Images& images) {
+  const int width = images[0]->width(), height = images[0]->height();
+  const double count = static_cast<double>(images.size());
   Plane<float> own(width, height, kUnfilled), mean(width, height, kUnfilled), logarithm(width, height, kUnfilled);
   parallelChunks(own.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       double sum = 0, logs = 0;
-      for (const Estimate* e : candidates) {
-        const double b = brightness(imageOf(*e), i);
+      for (const Rgb<float>* image : images) {
+        const double b = brightness(*image, i);
         sum += b;
         logs += std::log(b + kOwnOffset);
       }
@@ -62,9 +62,14 @@ Plane<float> commonLevel(const std::vector<const Estimate*>& candidates, ImageOf
 }  // namespace
 
 Plane<float> commonErrorRoots(const std::vector<const Estimate*>& candidates) {
-  Plane<float> level = commonLevel(candidates, [](const Estimate& e) -> const Rgb<float>& { return e.mean; });
-  const Plane<float> a = commonLevel(candidates, [](const Estimate& e) -> const Rgb<float>& { return e.half[0]; });
-  const Plane<float> b = commonLevel(candidates, [](const Estimate& e) -> const Rgb<float>& { return e.half[1]; });
+  Images all, ofA, ofB;
+  for (const Estimate* e : candidates) {
+    all.push_back(&e->mean);
+    ofA.push_back(&e->half[0]);
+    ofB.push_back(&e->half[1]);
+  }
+  Plane<float> level = commonLevel(all);
+  const Plane<float> a = commonLevel(ofA), b = commonLevel(ofB);
   const Plane<float> aboutA = boxMean<float>(a, kNear), aboutB = boxMean<float>(b, kNear);
   parallelChunks(level.size(), kPixelChunk, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
