@@ -6,9 +6,10 @@
 //   3. filter x, its direct and indirect light apart where they are known (direct_indirect.h);
 //   4. shrink x towards every filter (shrinkage.h): filters and shrunk images are the candidates;
 //   5. combine them by errors measured across halves at several scales (scale_weights.h);
-//   6. refilter the result, where halves show its use (refilter.h);
-//   7. give it the light back that filters have lost (lost_light.h);
-//   8. estimate the error (half_statistics.h), with the squared bias that the photon maps leave.
+//   6. take the noise of the albedo out of the result (settled_albedo.h);
+//   7. refilter it, where halves show its use (refilter.h);
+//   8. give it the light back that filters have lost (lost_light.h);
+//   9. estimate the error (half_statistics.h), with the squared bias that the photon maps leave.
 // x itself is no candidate: halves cannot see the error of a firefly in the half that holds it.
 #include <algorithm>
 #include <array>
@@ -26,6 +27,7 @@
 #include "combiners/auto/auto_filters.h"
 #include "combiners/auto/lost_light.h"
 #include "combiners/auto/refilter.h"
+#include "combiners/auto/settled_albedo.h"
 #include "combiners/shrinkage/shrinkage.h"
 #include "combiners/statistics/local_range_clamp.h"
 #include "renderer/film/make_attribute.h"
@@ -38,6 +40,7 @@ const OptionInfo kFuse{"auto-fuse", 1, "0: photon maps are bases, not part of th
 const OptionInfo kDebias{"auto-debias", 1, "0: photon maps are not corrected by their own bias estimate"};
 const OptionInfo kShrink{"auto-shrink", 1, "0: bases only, without James-Stein shrinkage towards them"};
 const OptionInfo kRefilter{"auto-refilter", 1, "0: the combined image is not filtered once more"};
+const OptionInfo kAlbedo{"auto-settle-albedo", 1, "0: noise of the albedo stays"};
 const OptionInfo kDirectIndirect{"auto-direct-indirect", 1, "0: direct and indirect light are filtered together"};
 const OptionInfo kLostLight{"auto-lost-light", 1, "0: light that filters have lost is not given back"};
 const OptionInfo kFireflies{"auto-remove-fireflies", 1, "0: keep fireflies"};
@@ -48,6 +51,8 @@ const OptionInfo kFireflies{"auto-remove-fireflies", 1, "0: keep fireflies"};
 constexpr uint64_t kPartsPasses = 16, kShrinkPasses = 16;
 // From so many passes on the other filters are as good without a network (combiners/EXPERIMENTS.md, Kernel prediction).
 constexpr uint64_t kLearnedPasses = 256;
+// From so many passes on the noise of the albedo is of no account (combiners/EXPERIMENTS.md, Noise of the albedo).
+constexpr uint64_t kSettledPasses = 64;
 constexpr int kNamedRange = 2;  // radius in pixels of the range that images of other denoisers are kept in
 
 class Auto : public Method {
@@ -68,7 +73,7 @@ class Auto : public Method {
   }
   MethodMemory memory(const MemoryCase& of) const override;
   std::vector<OptionInfo> options() const override {
-    return {kFuse, kDebias, kDirectIndirect, kShrink, kFireflies, kRefilter, kLostLight};
+    return {kFuse, kDebias, kDirectIndirect, kShrink, kFireflies, kAlbedo, kRefilter, kLostLight};
   }
   MethodResult run(const MethodInputs& in) const override;
 };
@@ -180,6 +185,7 @@ class AutoRun {
   void filter();
   void shrink();
   void combine();
+  void settleCombined();
   void refilterCombined();
   void giveLostLight();
   void estimateError();
@@ -218,6 +224,7 @@ MethodResult AutoRun::run() {
   }
   shrink();
   if (!in_.cancelled()) combine();
+  if (!in_.cancelled()) settleCombined();
   if (!in_.cancelled()) refilterCombined();
   if (!in_.cancelled()) giveLostLight();
   if (!in_.cancelled() && !in_.firstPass) estimateError();  // halves that were made tell nothing
@@ -292,6 +299,12 @@ void AutoRun::combine() {
     result_.aovs.push_back({"weight.auto." + layerName(candidates[b]->name), std::move(maps[b])});
   shrunk_.clear();  // their memory is what refiltering and the error map need
   filters_.clear();
+}
+
+void AutoRun::settleCombined() {
+  const uint64_t passes = passesOf(*x_);
+  if (isOn(kAlbedo) && !in_.firstPass && passes < kSettledPasses)
+    settleAlbedo(result_.image, x_->variance, in_.features, passes, in_.cancel);
 }
 
 void AutoRun::refilterCombined() {

@@ -16,7 +16,7 @@ constexpr uint64_t kFirstOrderPasses = 64;  // fewer: slopes fit noise
 
 // The careful filter is for what the wide one takes for noise, which is small (combiners/EXPERIMENTS.md, Careful
 // filter).
-constexpr PatchWelchNeighbours kCarefulNeighbours{4, 4};
+constexpr PatchWelchNeighbours kCarefulNeighbours{4};
 constexpr int kFirstOrderStride = 7;  // with a careful filter beside it, fits every fifth pixel change no error either
 
 Estimate asEstimate(std::vector<Rgb<float>> images, const char* name) {

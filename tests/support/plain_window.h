@@ -3,14 +3,10 @@
 #pragma once
 
 #include <cmath>
-#include <cstdlib>
 
 namespace braid::test {
 
-// All pixels up to 5 away, and every second one up to 9.
-inline bool inPlainWindow(int dx, int dy, double inner = 5, double outer = 9) {
-  const double distance = std::hypot(dx, dy);
-  return distance <= inner || (distance <= outer && std::abs(dx + dy) % 2 == 0);
-}
+// All pixels up to 8 away.
+inline bool inPlainWindow(int dx, int dy, double radius = 8) { return std::hypot(dx, dy) <= radius; }
 
 }  // namespace braid::test

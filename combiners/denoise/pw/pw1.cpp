@@ -14,7 +14,7 @@ namespace {
 const OptionInfo kThreshold = thresholdOption("pw1", kPatchWelchWideThreshold);
 const OptionInfo kStride{"pw1-stride", FirstOrderOptions().stride,
                          "Pixels between the centres of the fits: below 5, their weights take more memory than planned",
-                         1, PatchWelchNeighbours().outer};
+                         1, PatchWelchNeighbours().radius};
 
 class PatchWelchFirstOrder : public Method {
  public:
@@ -24,15 +24,15 @@ class PatchWelchFirstOrder : public Method {
   }
   MethodKind kind() const override { return MethodKind::Denoiser; }
   Needs needs() const override { return patchWelchNeeds(); }
-  // 42 of the peak are the weights at the usual stride.
-  MethodMemory memory(const MemoryCase& /*of*/) const override { return {90, 36, 4'550'000}; }
+  // 47 of the peak are the weights at the usual stride.
+  MethodMemory memory(const MemoryCase& /*of*/) const override { return {95, 36, 4'550'000}; }
   std::vector<OptionInfo> options() const override { return {kThreshold, kStride}; }
 
   MethodResult run(const MethodInputs& in) const override {
     const PatchWelchInput input = patchWelchInputOf(in, name());
     FirstOrderOptions options;
     options.threshold = thresholdOf(in, kThreshold);
-    options.stride = static_cast<int>(std::clamp(in.options.number(kStride), 1.0, 1.0 * PatchWelchNeighbours().outer));
+    options.stride = static_cast<int>(std::clamp(in.options.number(kStride), 1.0, 1.0 * PatchWelchNeighbours().radius));
     RegressionReport report;
     MethodResult result = patchWelchResult(patchWelchFirstOrder(input, options, in.cancel, &report));
     result.remarks = {numberAttribute(kThreshold.name, options.threshold),

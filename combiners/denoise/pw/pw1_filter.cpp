@@ -15,7 +15,7 @@ namespace braid {
 namespace {
 
 constexpr PatchWelchNeighbours kNeighbours;
-constexpr int kRadius = kNeighbours.outer, kSide = 2 * kRadius + 1;
+constexpr int kRadius = kNeighbours.radius, kSide = 2 * kRadius + 1;
 // The window is copied to contiguous memory, row by row, so that loops run over all of it at once. The corners outside
 // of the disc have weight zero.
 constexpr int kUnit = 16;

@@ -12,7 +12,7 @@ namespace {
 
 // The buffers of rows begin so many pixels left of the tile: all that a pair of it may reach.
 constexpr int kLead = kRowUnit;
-static_assert(kLead > PatchWelchNeighbours::kMostOuter);
+static_assert(kLead > PatchWelchNeighbours::kMostRadius);
 
 // The filter in one tile. The weight of a pair is the same seen from either pixel, hence only one of d and -d is
 // visited: each weight adds q to the sums of p and p to those of q. Pairs that reach into the tile from outside are
@@ -26,7 +26,7 @@ class TileFilter {
         height_(input.height()),
         thresholds_(squaredThresholds),
         neighbours_(neighbours),
-        reach_(neighbours.outer),
+        reach_(neighbours.radius),
         tile_(input, intersection(grown(tile, reach_ + 1), {0, 0, width_, height_}), tile.x0),
         images_(input.images.size()),
         kept_(kept),
@@ -281,7 +281,7 @@ std::vector<std::vector<Rgb<float>>> patchWelch(const PatchWelchInput& input, st
                                                 const std::atomic<bool>* cancel, PatchWelchWeights* kept) {
   BRAID_ASSERT(!thresholds.empty() && (input.images.size() == 1 || input.images.size() == 3));
   BRAID_ASSERT(!kept || thresholds.size() == 1);
-  BRAID_ASSERT(neighbours.inner <= neighbours.outer && neighbours.outer <= PatchWelchNeighbours::kMostOuter);
+  BRAID_ASSERT(neighbours.radius >= 0 && neighbours.radius <= PatchWelchNeighbours::kMostRadius);
   const int width = input.width(), height = input.height();
   std::vector<std::vector<Rgb<float>>> out(thresholds.size());
   for (std::vector<Rgb<float>>& images : out) images = unfilledImages(input);

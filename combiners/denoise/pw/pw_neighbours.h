@@ -4,16 +4,13 @@
 
 namespace braid {
 
-// The pixels that are averaged in: all up to the inner distance in pixels, from there to the outer one every second, as
-// on a chessboard: 173 of the 253 pixels of the disc. Neighbours say much the same (combiners/EXPERIMENTS.md,
-// Neighbours of the patch-Welch filter).
+// The pixels that are averaged in: all up to a distance, 197 by default. Leaving some of them out would show: of every
+// second one, as a chessboard wherever a few bright samples are most of the light (combiners/EXPERIMENTS.md, All
+// neighbours).
 struct PatchWelchNeighbours {
-  static constexpr int kMostOuter = 9;
-  int inner = 5, outer = kMostOuter;  // 0 <= inner <= outer <= kMostOuter
-  constexpr bool contain(int dx, int dy) const {
-    const int distance2 = dx * dx + dy * dy;
-    return distance2 <= inner * inner || (distance2 <= outer * outer && (dx + dy) % 2 == 0);
-  }
+  static constexpr int kMostRadius = 8;
+  int radius = kMostRadius;  // in pixels, 0 to kMostRadius
+  constexpr bool contain(int dx, int dy) const { return dx * dx + dy * dy <= radius * radius; }
 };
 
 }  // namespace braid

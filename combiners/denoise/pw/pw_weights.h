@@ -39,7 +39,7 @@ class PatchWelchWeights {
   static float unpacked(uint16_t value) { return static_cast<float>(value) * (1 / kOne); }
 
  private:
-  static constexpr int kMost = PatchWelchNeighbours::kMostOuter;
+  static constexpr int kMost = PatchWelchNeighbours::kMostRadius;
   static constexpr float kOne = 65535;
 
   static size_t position(int dx, int dy) { return static_cast<size_t>((dy + kMost) * (2 * kMost + 1) + dx + kMost); }

@@ -95,13 +95,13 @@ class PlainFit {
     return sqr(std::max(0.0, 1 - s / count / t2_)) * std::exp(-(sqr(x - u) + sqr(y - v)) / 50.0);
   }
 
-  // The fit around (cx, cy), at (x, y): [1, dx/9, dy/9] with a ridge on the slopes; the other columns vanish.
+  // The fit around (cx, cy), at (x, y): [1, dx/8, dy/8] with a ridge on the slopes; the other columns vanish.
   double prediction(int cx, int cy, int x, int y, size_t channel) const {
     double m[3][4] = {};
-    for (int v = cy - 9; v <= cy + 9; ++v)
-      for (int u = cx - 9; u <= cx + 9; ++u) {
+    for (int v = cy - 8; v <= cy + 8; ++v)
+      for (int u = cx - 8; u <= cx + 8; ++u) {
         if (!inside(u, v) || !inPlainWindow(u - cx, v - cy)) continue;
-        const double w = weight(cx, cy, u, v), row[3] = {1, (u - cx) / 9.0, (v - cy) / 9.0};
+        const double w = weight(cx, cy, u, v), row[3] = {1, (u - cx) / 8.0, (v - cy) / 8.0};
         for (int i = 0; i < 3; ++i) {
           for (int j = 0; j < 3; ++j) m[i][j] += w * row[i] * row[j];
           m[i][3] += w * row[i] * static_cast<double>(mean_[channel].at(u, v));
@@ -114,7 +114,7 @@ class PlainFit {
       for (int k = 0; k < 3; ++k)
         if (k != i)
           for (int j = 3; j >= i; --j) m[k][j] -= m[i][j] * m[k][i] / m[i][i];
-    return m[0][3] / m[0][0] + m[1][3] / m[1][1] * (x - cx) / 9 + m[2][3] / m[2][2] * (y - cy) / 9;
+    return m[0][3] / m[0][0] + m[1][3] / m[1][1] * (x - cx) / 8 + m[2][3] / m[2][2] * (y - cy) / 8;
   }
 
   const Rgb<float>&mean_, &variance_;
