@@ -30,6 +30,7 @@ double referenceRadiance(const Scene& scene, double dome) {
 struct Lit {
   double received = 0;  // the share that their light meets
   bool enough = false;
+  bool showsUnlit = false;  // surfaces that need no light are a good part of the picture
 };
 
 // None where nothing seen needs light.
@@ -38,11 +39,12 @@ std::optional<Lit> measureLit(const Scene& scene, const Camera& camera, int widt
   const double reference = referenceRadiance(scene, dome);
   const LitShare direct = measureLitShare(context, camera, width, height, reference);
   if (!(direct.seen > 0)) return {};
-  if (direct.received >= kLeastLit || direct.share >= kLeastShining) return Lit{direct.received, true};
+  const bool showsUnlit = direct.unlit >= kLeastShining * (direct.unlit + direct.seen);
+  if (direct.received >= kLeastLit || direct.share >= kLeastShining) return Lit{direct.received, true, showsUnlit};
   // What camera paths do not find at once: light from other surfaces and through glass.
   const double scattered = measureLightReach(context, camera, width, height).scatteredRadiance;
   const double received = std::min(1.0, direct.received + scattered / reference);
-  return Lit{received, received >= kLeastLit};
+  return Lit{received, received >= kLeastLit, showsUnlit};
 }
 
 }  // namespace
@@ -63,7 +65,7 @@ std::optional<std::string> lightIfDark(Scene& scene, const CameraData& data, int
     scene.addDefaultLight(kind, scale, text);
   }
   const std::optional<Lit> lit = measureLit(scene, camera, width, height, dome);
-  if (!lit || lit->enough) return text.empty() ? std::nullopt : std::optional(text);
+  if (!lit || lit->enough || lit->showsUnlit) return text.empty() ? std::nullopt : std::optional(text);
   text = fmt::format(
       "{}{}this light does not reach what the camera sees: the picture stays dark (--camera, --look-at: "
       "look from elsewhere)",

@@ -37,7 +37,10 @@ class Glance {
   Onward onHit(int index, const SubpathVertex& vertex) {
     const auto i = static_cast<size_t>(index);
     met_ = true;
-    if (vertex.hit.material->unlit) return Onward::End;
+    if (vertex.hit.material->unlit) {
+      unlit_ += static_cast<double>(average(vertex.throughput));
+      return Onward::End;
+    }
     emitted_[i] += emittedTowards(context_.scene, vertex.hit);
     if (!vertex.bsdf.hasNonDelta()) return Onward::Scatter;
     weight_[i] = average(vertex.throughput);
@@ -64,6 +67,7 @@ class Glance {
       sum.share += weight * std::min(1.0, static_cast<double>(emitted_[i] + received_[i]) / reference);
       sum.received += weight * std::min(1.0, static_cast<double>(received_[i]) / reference);
     }
+    if (std::isfinite(unlit_)) sum.unlit += unlit_;
     sum.seesSurfaces = sum.seesSurfaces || met_;
   }
 
@@ -95,6 +99,7 @@ class Glance {
   std::array<size_t, kBatch> owner_{};
   VisibilityBatch rays_;
   int shadows_ = 0;
+  double unlit_ = 0;
   bool met_ = false;
 };
 

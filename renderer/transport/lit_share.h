@@ -10,6 +10,7 @@ namespace braid {
 struct LitShare {
   bool seesSurfaces = false;  // whether any camera path met a surface
   double seen = 0;            // weight of the surfaces that need light: not the background, not unlit ones
+  double unlit = 0;           // that of unlit ones
   // Of these, the share that emits or is met by direct light. A point counts in full from `reference` on, by the
   // radiance it emits and the radiance of a white diffuse surface there, and in proportion below it.
   double share = 0;

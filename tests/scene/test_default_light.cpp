@@ -190,6 +190,14 @@ TEST_CASE("Default light: it follows --light-scale, and a room that it cannot en
   CHECK(outcomeOf(inside).text.empty());
   addMesh(inside, std::move(room), 0);
   CHECK(contains(outcomeOf(inside).text, "the picture stays dark"));
+
+  Material label = inside.materials[0];
+  label.unlit = true;
+  inside.materials.push_back(label);
+  TriangleMesh board;
+  addQuad(board, {-1, 0.01f, 1}, {1.2f, 0, 0}, {0, 0, -2});
+  addMesh(inside, std::move(board), 1);
+  CHECK(outcomeOf(inside).text.empty());  // the unlit board is to be seen
 }
 
 TEST_CASE("Default light: files whose lights or textures are black have none") {
