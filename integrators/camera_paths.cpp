@@ -34,16 +34,19 @@ void unlitFeatures(const Spectrum& color, const Hit& hit, float distance, Featur
   features.depth = distance;
 }
 
-bool recordFeatures(const Scene& scene, const SubpathVertex& vertex, int maxDepth, FeatureSample& features) {
+bool recordFeatures(const Scene& scene, const SubpathVertex& vertex, int maxDepth, PathSample& sample) {
   const bool goesOn = vertex.segments < maxDepth || vertex.bsdf.passesStraight();
   if (!vertex.bsdf.hasNonDelta() && goesOn && !vertex.hit.material->scatters()) return false;
-  surfaceFeatures(scene, vertex.hit, vertex.bsdf, vertex.travelled, features);
+  surfaceFeatures(scene, vertex.hit, vertex.bsdf, vertex.travelled, sample.features);
+  sample.leastLobe = vertex.leastLobe;
   return true;
 }
 
-Spectrum unlitColor(const Scene& scene, const SubpathVertex& vertex, bool record, FeatureSample& features) {
+Spectrum unlitColor(const Scene& scene, const SubpathVertex& vertex, bool record, PathSample& sample) {
   const Spectrum color = baseColorAt(scene, vertex.hit);
-  if (record) unlitFeatures(color, vertex.hit, vertex.travelled, features);
+  if (!record) return color;
+  unlitFeatures(color, vertex.hit, vertex.travelled, sample.features);
+  sample.leastLobe = vertex.leastLobe;
   return color;
 }
 
@@ -55,7 +58,7 @@ std::optional<LightHit> lightAt(const Scene& scene, const Hit& hit) {
 }
 
 Spectrum radianceBeyond(const Scene& scene, const Plan& plan, const Vec3& direction, bool fromCamera, bool record,
-                        PathSample& sample) {
+                        float leastLobe, PathSample& sample) {
   if (fromCamera) sample.coverage = 0;
   Spectrum radiance(0);
   if (fromCamera && plan.settings.background) {
@@ -67,6 +70,7 @@ Spectrum radianceBeyond(const Scene& scene, const Plan& plan, const Vec3& direct
     sample.features.setAlbedo(radiance);
     sample.features.normal = -direction;
     sample.features.depth = 0;
+    sample.leastLobe = leastLobe;
   }
   return fromCamera && plan.settings.transparent ? Spectrum(0) : radiance;
 }

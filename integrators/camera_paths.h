@@ -18,6 +18,7 @@ struct PathSample {
   float coverage = 1;     // 0 when the camera ray misses everything
   bool onGround = false;  // of a shadow catcher: the radiance says how much of it is in shadow
   FeatureSample features;
+  float leastLobe = 1;  // the least probability of the delta lobes that led to what the features describe
 };
 
 // The ray of a sample of pixel (x, y) of the full frame at a time; its place in the pixel follows the plan's filter.
@@ -29,10 +30,10 @@ void surfaceFeatures(const Scene& scene, const Hit& hit, const Bsdf& bsdf, float
 void unlitFeatures(const Spectrum& color, const Hit& hit, float distance, FeatureSample& features);
 
 // Records a vertex as the first that is not specular, or as the last of its path; false when it is neither.
-bool recordFeatures(const Scene& scene, const SubpathVertex& vertex, int maxDepth, FeatureSample& features);
+bool recordFeatures(const Scene& scene, const SubpathVertex& vertex, int maxDepth, PathSample& sample);
 
 // Records an unlit surface and returns its colour, which only the camera and mirrors see.
-Spectrum unlitColor(const Scene& scene, const SubpathVertex& vertex, bool record, FeatureSample& features);
+Spectrum unlitColor(const Scene& scene, const SubpathVertex& vertex, bool record, PathSample& sample);
 
 // A light of LightSampler that a path hits, so that light sampling may have found it as well.
 struct LightHit {
@@ -41,8 +42,9 @@ struct LightHit {
 };
 std::optional<LightHit> lightAt(const Scene& scene, const Hit& hit);
 
-// What a ray that leaves the scene brings into the sample of its path. `record`: it has seen nothing to record before.
+// What a ray that leaves the scene brings into the sample of its path. `record`: it has seen nothing to record before,
+// and has come over delta lobes of that least probability.
 Spectrum radianceBeyond(const Scene& scene, const Plan& plan, const Vec3& direction, bool fromCamera, bool record,
-                        PathSample& sample);
+                        float leastLobe, PathSample& sample);
 
 }  // namespace braid

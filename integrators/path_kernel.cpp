@@ -29,7 +29,7 @@ void PathKernel::add(const Spectrum& radiance, bool direct, PathSample& sample) 
 
 void PathKernel::addEnvironment(const PathState& path, PathSample& sample) const {
   const Spectrum radiance =
-      radianceBeyond(scene_, plan_, path.direction, path.fromCamera(), !path.featuresDone, sample);
+      radianceBeyond(scene_, plan_, path.direction, path.fromCamera(), !path.featuresDone, path.leastLobe, sample);
   if (isBlack(radiance)) return;
   float weight = 1;
   if (!path.lightCouldNotBeSampled)
@@ -90,6 +90,7 @@ void PathKernel::addUnlit(PathState& path, const Hit& hit, PathSample& sample) c
   if (!wantFeatures_ || path.featuresDone) return;
   path.featuresDone = true;
   unlitFeatures(color, hit, path.featureDistance + hit.distance, sample.features);
+  sample.leastLobe = path.leastLobe;
 }
 
 void PathKernel::recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsdf, PathSample& sample) const {
@@ -98,6 +99,7 @@ void PathKernel::recordFeatures(PathState& path, const Hit& hit, const Bsdf& bsd
   if (!bsdf.hasNonDelta() && goesOn && !hit.material->scatters()) return;
   path.featuresDone = true;
   surfaceFeatures(scene_, hit, bsdf, path.featureDistance, sample.features);
+  sample.leastLobe = path.leastLobe;
 }
 
 // Continues the path in a direction sampled from the BSDF and the guide; false when it ends here.
@@ -105,6 +107,7 @@ bool PathKernel::scatter(PathState& path, const Hit& hit, const GuidedBsdf& bsdf
                          const SampleBlock& block) const {
   GuidedSample sample;
   if (!bsdf.sample(block, sample)) return false;
+  if (sample.delta && !path.featuresDone) path.leastLobe = std::min(path.leastLobe, sample.pdfW);
   if (!(sample.straight ? passPane(path, hit, sample.weight) : turn(path, hit, bsdf.bsdf(), twoSided, sample)))
     return false;
   if (!sample.delta) {
@@ -151,6 +154,7 @@ void PathKernel::startAt(float time, int x, int y, uint64_t key) {
   const SampleBlock camera = sampler_.block(key, 0);
   const Camera::CameraRay ray = cameraRayThrough(plan_, camera, x, y, time);
   const auto i = static_cast<size_t>(count_++);
+  start_[i] = {x, y, key, time};
   // In place: assigned, they would take the way over the stack.
   std::construct_at(&sample_[i]);
   PathState& path = *std::construct_at(&path_[i]);
@@ -183,6 +187,8 @@ void PathKernel::run() {
     traceShadows();
   }
   addBranches();
+  for (size_t i = 0; i < static_cast<size_t>(count_); ++i) likely_.add(start_[i], sample_[i]);
+  rayCount += likely_.run();
 }
 
 void PathKernel::queueRay(int slot, PathState& path) {

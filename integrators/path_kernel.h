@@ -10,6 +10,7 @@
 
 #include "integrators/camera_paths.h"
 #include "integrators/guiding/guide_record.h"
+#include "integrators/likely_features.h"
 #include "integrators/path_state.h"
 #include "renderer/session/integrator.h"
 #include "renderer/transport/visibility.h"
@@ -86,6 +87,7 @@ class PathKernel {
         cameraMedia_(mediaOfCamera(context.scene, plan.camera)),
         path_(static_cast<size_t>(kBatch * coloursOf(scene_))),
         sample_(kBatch),
+        likely_(context, plan, sampler),
         shadowRays_(context) {}
 
   // Starts a path through pixel (x, y) of the full frame with the random numbers of `key`. At most kBatch before a
@@ -155,6 +157,8 @@ class PathKernel {
   std::vector<PathState> path_;
   std::vector<PathSample> sample_;  // branch k of path i adds to one of its own, so that sums have one order
   std::array<bool, kBatch> isSplit_;
+  std::array<CameraStart, kBatch> start_;
+  LikelyFeatures likely_;
   std::vector<int> waiting_, free_;  // paths that are not active yet; places of path_
   RayBatch rays_;                    // in the order of active_, like their hits
   std::array<RayHit, kBatch> query_;

@@ -40,6 +40,7 @@ struct PathState {
   int bounces = 0;            // scattered at the first non-specular vertex and since; up to 1 of them, light is direct
   bool isBranch = false;      // of a path that was split, which is done once
   bool featuresDone = false;  // the first non-specular vertex is behind
+  float leastLobe = 1;        // the least probability of the delta lobes taken before
   float featureDistance = 0;  // metres travelled up to it
 
   WalkState walk;

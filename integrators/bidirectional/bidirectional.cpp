@@ -82,6 +82,7 @@ BidirectionalKernel::BidirectionalKernel(const PassRequest& request, const Bidir
       mergeWeight_(merging_ ? merging_->mergeWeight : 0.0),
       light_(request.context, lights_.sampler, bidirectionalWalk(request.plan, Transport::Power, merging_)),
       eye_(request.context, eyeSampler_, bidirectionalWalk(request.plan, Transport::Radiance, merging_)),
+      likely_(request.context, request.plan, eyeSampler_),
       queue_(request.context, [this](const ConnectionQueue::Entry& e) { deliver(e); }) {}
 
 void BidirectionalKernel::render(const std::vector<std::pair<int, int>>& pixels) {
@@ -108,6 +109,9 @@ void BidirectionalKernel::render(const std::vector<std::pair<int, int>>& pixels)
   eye_.run([&](int i, const SubpathState& s, const SubpathVertex& v) { return shadeEyeVertex(i, s, v); },
            [&](int i, const SubpathState& s) { addEnvironment(i, s); });
   queue_.flush();
+  for (size_t i = 0; i < pixels.size(); ++i)
+    likely_.add({pixels[i].first, pixels[i].second, eyeSampler_.itemKey(item(pixels[i])), pathTime_[i]}, sample_[i]);
+  likelyRays_ += likely_.run();
   for (size_t i = 0; i < pixels.size(); ++i)
     storeSample(request_, pixels[i].first, pixels[i].second, sample_[i], target_);
 }
@@ -156,9 +160,8 @@ Onward BidirectionalKernel::shadeEyeVertex(int index, const SubpathState& state,
   }
   if (material.emissive) addEmission(index, state, vertex);
   bool& featuresDone = featuresDone_[static_cast<size_t>(index)];
-  const bool first =
-      plan_.kept.features && !featuresDone &&
-      recordFeatures(scene_, vertex, plan_.settings.maxDepth, sample_[static_cast<size_t>(index)].features);
+  const bool first = plan_.kept.features && !featuresDone &&
+                     recordFeatures(scene_, vertex, plan_.settings.maxDepth, sample_[static_cast<size_t>(index)]);
   featuresDone = featuresDone || first;
   if (vertex.segments >= plan_.settings.maxDepth) return Onward::Pass;
   if (!vertex.bsdf.hasNonDelta()) return Onward::Scatter;
@@ -171,8 +174,7 @@ Onward BidirectionalKernel::shadeEyeVertex(int index, const SubpathState& state,
 // As in the path tracer: shown to the camera and to mirrors only.
 void BidirectionalKernel::addUnlit(int index, const SubpathState& state, const SubpathVertex& vertex) {
   bool& done = featuresDone_[static_cast<size_t>(index)];
-  const Spectrum color =
-      unlitColor(scene_, vertex, plan_.kept.features && !done, sample_[static_cast<size_t>(index)].features);
+  const Spectrum color = unlitColor(scene_, vertex, plan_.kept.features && !done, sample_[static_cast<size_t>(index)]);
   done = true;
   if (state.lightCouldNotBeSampled) add(index, 0, vertex.segments + 1, vertex.throughput * color);
 }
@@ -193,7 +195,7 @@ void BidirectionalKernel::addEmission(int index, const SubpathState& state, cons
 void BidirectionalKernel::addEnvironment(int index, const SubpathState& state) {
   const Spectrum radiance =
       radianceBeyond(scene_, plan_, state.direction, state.fromCamera(), !featuresDone_[static_cast<size_t>(index)],
-                     sample_[static_cast<size_t>(index)]);
+                     state.leastLobe, sample_[static_cast<size_t>(index)]);
   if (isBlack(radiance)) return;
   double weight = 1;
   if (state.segments > 1) {

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "integrators/bidirectional/merge_grid.h"
+#include "integrators/likely_features.h"
 #include "integrators/path_kernel.h"
 #include "renderer/transport/subpath.h"
 
@@ -95,7 +96,7 @@ class BidirectionalKernel {
   // Renders up to kBatch pixels (full-frame coordinates) and stores their samples; splats go anywhere.
   void render(const std::vector<std::pair<int, int>>& pixels);
 
-  uint64_t rayCount() const { return light_.rayCount + eye_.rayCount; }
+  uint64_t rayCount() const { return light_.rayCount + eye_.rayCount + likelyRays_; }
   uint64_t shadowRayCount() const { return queue_.rayCount; }
 
  private:
@@ -125,6 +126,8 @@ class BidirectionalKernel {
   const std::optional<float> time_;
   double mergeWeight_;  // 0 without merging
   SubpathBatch light_, eye_;
+  LikelyFeatures likely_;
+  uint64_t likelyRays_ = 0;
   ConnectionQueue queue_;
   const std::vector<std::pair<int, int>>* pixels_ = nullptr;
   std::array<std::vector<SubpathVertex>, kBatch> stored_;  // light vertices that connections may use

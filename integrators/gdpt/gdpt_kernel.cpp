@@ -54,6 +54,7 @@ void GradientKernel::start(int x, int y, uint64_t key) {
   };
   BasePath& base = lanes_.emplace_back();
   base.walker.path = camera(x, y);
+  base.start = start_[0];
   const PixelWindow& window = plan_.window;
   for (int j = 0; j < kNeighbours; ++j) {
     const int nx = x + kNeighbourX[j], ny = y + kNeighbourY[j];
@@ -80,6 +81,8 @@ void GradientKernel::run() {
     for (int j = 0; j < kNeighbours; ++j) advanceShifts(j);
     for (BasePath& base : lanes_) pairLight(base);
   }
+  for (BasePath& base : lanes_) likely_.add(base.start, base.result.path);
+  rayCount += likely_.run();
 }
 
 void GradientKernel::arrive(const std::vector<Walker*>& walkers, const std::vector<PathSample*>& samples) {

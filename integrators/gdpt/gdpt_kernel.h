@@ -84,6 +84,7 @@ class GradientKernel : PathKernel {
     bool roulette = false;
   };
   struct BasePath {
+    CameraStart start;
     Walker walker;
     Vertex vertex;
     ShiftedPath shift[kNeighbours];

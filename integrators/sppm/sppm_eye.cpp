@@ -34,6 +34,7 @@ PhotonEyeBatch::PhotonEyeBatch(const TransportContext& context, const Plan& plan
       time_(time),
       lightsCanBeHit_(!context.scene.emitters().empty() || context.scene.environment()),
       walks_(context, sampler, eyeSettings(plan, caustics)),
+      likely_(context, plan, sampler),
       shadowRays_(context) {}
 
 void PhotonEyeBatch::clear() {
@@ -48,6 +49,7 @@ void PhotonEyeBatch::start(int x, int y, uint64_t key) {
   path_[static_cast<size_t>(count_)] = Path();
   sample_[static_cast<size_t>(count_)] = PathSample();
   bias_[static_cast<size_t>(count_)] = Spectrum(0);
+  start_[static_cast<size_t>(count_)] = {x, y, key, time_};
   ++count_;
   walks_.startCamera(key, ray, cameraMedia_, 1, 1, plan_.camera.orthographic());
 }
@@ -64,9 +66,8 @@ PhotonEyeBatch::Step PhotonEyeBatch::shade(int index, SubpathState& state, Subpa
   }
   if (material.emissive) addEmission(index, state, vertex);
   if (path.seekingLight) return {.onward = Onward::Pass};
-  const bool first =
-      plan_.kept.features && !path.featuresDone &&
-      recordFeatures(scene_, vertex, plan_.settings.maxDepth, sample_[static_cast<size_t>(index)].features);
+  const bool first = plan_.kept.features && !path.featuresDone &&
+                     recordFeatures(scene_, vertex, plan_.settings.maxDepth, sample_[static_cast<size_t>(index)]);
   path.featuresDone = path.featuresDone || first;
   if (vertex.segments >= plan_.settings.maxDepth) return {.onward = Onward::Pass};
   if (!vertex.bsdf.hasNonDelta()) return {.onward = Onward::Scatter};
@@ -128,7 +129,7 @@ float PhotonEyeBatch::causticHitWeight(int index, const SubpathState& state, uin
 void PhotonEyeBatch::addUnlit(int index, const SubpathState& state, const SubpathVertex& vertex) {
   PathSample& sample = sample_[static_cast<size_t>(index)];
   bool& done = path_[static_cast<size_t>(index)].featuresDone;
-  const Spectrum color = unlitColor(scene_, vertex, plan_.kept.features && !done, sample.features);
+  const Spectrum color = unlitColor(scene_, vertex, plan_.kept.features && !done, sample);
   done = true;
   if (state.lightCouldNotBeSampled) sample.radiance += vertex.throughput * color;
 }
@@ -156,7 +157,7 @@ void PhotonEyeBatch::addEnvironment(int index, const SubpathState& state) {
   path.arrive(state);
   if (path.seekingLight && state.walked) return;
   const Spectrum radiance =
-      radianceBeyond(scene_, plan_, state.direction, state.fromCamera(), !path.featuresDone, sample);
+      radianceBeyond(scene_, plan_, state.direction, state.fromCamera(), !path.featuresDone, state.leastLobe, sample);
   if (isBlack(radiance)) return;
   float weight = 1;
   if (state.lightCouldNotBeSampled)

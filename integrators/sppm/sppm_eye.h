@@ -34,6 +34,8 @@ class PhotonEyeBatch {
         },
         [&](int index, const SubpathState& state) { addEnvironment(index, state); });
     traceShadows();
+    for (size_t i = 0; i < static_cast<size_t>(count_); ++i) likely_.add(start_[i], sample_[i]);
+    likelyRays_ += likely_.run();
   }
   // Without the light gathered at broad lobes, which the caller adds.
   PathSample& sample(int i) { return sample_[static_cast<size_t>(i)]; }
@@ -42,7 +44,7 @@ class PhotonEyeBatch {
   // Adds what was gathered at a vertex to the sample.
   void addGathered(int index, const SubpathVertex& vertex, const PhotonSum& sum, double lightPaths, float radius);
   void clear();
-  uint64_t rayCount() const { return walks_.rayCount; }
+  uint64_t rayCount() const { return walks_.rayCount + likelyRays_; }
   uint64_t shadowRayCount = 0;
   uint64_t photonCount = 0;  // that gathers found
 
@@ -100,6 +102,9 @@ class PhotonEyeBatch {
   std::array<Path, kBatch> path_;
   std::array<PathSample, kBatch> sample_;
   std::array<Spectrum, kBatch> bias_;
+  std::array<CameraStart, kBatch> start_;
+  LikelyFeatures likely_;
+  uint64_t likelyRays_ = 0;
 
   struct Shadow {
     int index;

@@ -265,6 +265,7 @@ void SubpathBatch::finishVertex(const SubpathState& state, const Hit& hit, Subpa
   vertex.twoSided = (context_.summaryOf(hit).lobes & kTransmittingLobes) != 0;
   vertex.woBelow = !(vertex.wo.z > 0);
   vertex.deltaOnly = state.deltaOnly;
+  vertex.leastLobe = state.leastLobe;
   vertex.walked = state.walked;
 }
 
@@ -274,8 +275,10 @@ bool SubpathBatch::scatter(SubpathState& state, const SubpathVertex& vertex) con
   if (power && vertex.woBelow) return pass(state, hit, vertex.bsdf.straightTransmittance());
   const SampleBlock block = sampler_.block(state.key, state.block() + (power ? 1u : 0u));
   BsdfSample sample;
-  if (!vertex.bsdf.sample(block.u[slot::kLobe], {block.u[slot::kBsdfU], block.u[slot::kBsdfV]}, sample)) return false;
+  const float lobe = settings_.likelyLobes ? 0.5f : block.u[slot::kLobe];
+  if (!vertex.bsdf.sample(lobe, {block.u[slot::kBsdfU], block.u[slot::kBsdfV]}, sample)) return false;
   if (!(sample.straight ? pass(state, hit, sample.weight) : turn(state, vertex, sample))) return false;
+  if (sample.delta) state.leastLobe = std::min(state.leastLobe, sample.pdfW);
 
   const float relative = maxComponent(state.throughput) / (state.startThroughput * state.etaScale);
   const float survival = settings_.roulette.survival(state.segments, relative);

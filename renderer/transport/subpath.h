@@ -42,6 +42,7 @@ struct WalkSettings {
   double mergeWeight = 0;    // etaVCM² with etaVCM = π r² · light subpaths, else 0
   bool mis = true;           // false: the quantities are not needed and stay 0
   bool deltaChains = false;  // whether SubpathState::chain is needed
+  bool likelyLobes = false;  // lobes are not drawn: the walk takes the one that most would
 };
 
 // A surface point that a walk has arrived at.
@@ -59,6 +60,7 @@ struct SubpathVertex {
   float travelled = 0;     // metres since the start of the walk
   bool woBelow = false;    // wo lies below the horizon of the shading normal
   bool deltaOnly = false;  // everything since the start of the walk was delta
+  float leastLobe = 1;     // SubpathState::leastLobe
   bool walked = false;     // a medium has scattered it since the last vertex, or since the start
 
   SubpathVertex(const SurfaceParameters& p, const Vec3& o, Transport t) : bsdf(p, o, t), wo(o) {}
@@ -109,6 +111,7 @@ struct SubpathState {
   // starts at the other end, pdfEmit or that of a BSDF, remains to be multiplied with.
   double chain = 0;
   float leastPdfW = kInfinity;  // of the directions sampled so far; delta ones do not count
+  float leastLobe = 1;          // the least probability of the delta lobes taken so far
   bool atStart = true;          // no surface met yet
 
   // The last vertex that scattered, for the weight of lights that the walk hits.
