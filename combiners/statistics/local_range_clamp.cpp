@@ -15,7 +15,7 @@ namespace {
 constexpr int kTileWidth = 256, kTileHeight = 8;
 constexpr float kBrighter = 4, kDarker = 12;  // squared normal deviates: 2² and 3.5²
 constexpr float kSlack = 0.1f;
-constexpr float kFew = 3;  // pixels alike, with the pixel itself
+constexpr float kAlone = 1;  // pixels alike: the pixel itself
 
 // Widens the range of `count` pixels p by the values of the pixels q that are alike, and counts these.
 struct PairRows {
@@ -65,7 +65,7 @@ void keepTile(Plane<float>& image, const Channel& of, int radius, const PixelRec
     widenByWindows(of, radius, tile.x0, tile.x1, y, kBrighter, {least.data(), most.data(), alike.data()});
     for (int x = 0; x < tile.width(); ++x) {
       const auto i = static_cast<size_t>(x);
-      if (alike[i] <= kFew)
+      if (alike[i] <= kAlone)
         widenByWindows(of, radius, tile.x0 + x, tile.x0 + x + 1, y, kDarker, {&least[i], &most[i], &alike[i]});
       float& pixel = image.at(tile.x0 + x, y);
       pixel = std::clamp(pixel, least[i] - kSlack * std::fabs(least[i]), most[i] + kSlack * std::fabs(most[i]));
