@@ -47,17 +47,36 @@ std::optional<Lit> measureLit(const Scene& scene, const Camera& camera, int widt
   return Lit{received, received >= kLeastLit, showsUnlit};
 }
 
+bool hasLights(const Scene& scene) {
+  return scene.traits().has(kTraitEmissiveTriangles | kTraitPointLights | kTraitDirectionalLights);
+}
+
+// Of a scene that no light may be added to.
+std::optional<std::string> sayIfDark(const Scene& scene, const Camera& camera, int width, int height, double dome) {
+  const bool hasEnvironment = scene.environment().has_value();
+  if (hasEnvironment && average(scene.environment()->average()) > 0) return {};
+  const std::optional<Lit> lit = measureLit(scene, camera, width, height, dome);
+  if (!lit || lit->enough || lit->showsUnlit) return {};
+  return fmt::format("{}{}: the picture stays dark ({})", hasEnvironment ? "the environment is black, and " : "",
+                     hasLights(scene) ? fmt::format("the lights of the file light {:.2g} % of what the camera sees",
+                                                    100 * lit->received)
+                                      : "the file has no light",
+                     hasEnvironment ? "without --env a studio is added" : "--default-light studio adds one");
+}
+
 }  // namespace
 
 std::optional<std::string> lightIfDark(Scene& scene, const CameraData& data, int width, int height, float scale,
                                        DefaultLight kind) {
   const double dome = static_cast<double>(kDefaultDome * scale);
+  if (!(dome > 0)) return {};
   const bool hasDome = scene.data().defaultLight;
-  if (!(dome > 0) || (scene.environment() && !hasDome)) return {};
   const Camera camera(data, width, height);
+  if (kind == DefaultLight::None || (scene.environment() && !hasDome))
+    return sayIfDark(scene, camera, width, height, dome);
   std::string text;
   if (!hasDome) {
-    if (!scene.traits().has(kTraitEmissiveTriangles | kTraitPointLights | kTraitDirectionalLights)) return {};
+    if (!hasLights(scene)) return {};
     const std::optional<Lit> own = measureLit(scene, camera, width, height, dome);
     if (!own || own->enough) return {};
     text = fmt::format("the lights of the file light {:.2g} % of what the camera sees; {}", 100 * own->received,

@@ -14,7 +14,7 @@ namespace braid {
 // Returns what to tell the user: that, or that the picture stays dark all the same. A pure function of the scene, the
 // camera and the shape of the frame, so that every command and every machine decides alike. Nothing is added to scenes
 // with an environment or without anything that emits (the loader has decided on these) and where all that is seen is
-// unlit.
+// unlit. With the kind None and under a black environment nothing is added either, but that it stays dark is told.
 //
 // The light is compared with that of the dome, which is that of the studio on average, or with the radiance of the
 // brightest emitter where that is less, so that a scene of dim lamps is as lit as the same scene with bright ones.

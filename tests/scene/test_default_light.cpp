@@ -239,6 +239,29 @@ TEST_CASE("Default light: files whose lights or textures are black have none") {
   CHECK_FALSE(dark.load().defaultLight);
 }
 
+TEST_CASE("Default light: a picture that stays dark is told where no light may be added") {
+  const auto told = [](const SceneData& data, DefaultLight kind) {
+    Scene scene(data);
+    const std::string text = lightIfDark(scene, data.cameras.at(0), kWidth, kHeight, 1, kind).value_or("");
+    CHECK_FALSE(scene.data().defaultLight);
+    return text;
+  };
+  SceneData data = floorScene();
+  CHECK(contains(told(data, DefaultLight::None), "the file has no light: the picture stays dark (--default-light"));
+  data.lights = {lightAt(PunctualKind::Spot, {0, 1, 0}, {0, 1, 0}, 1)};
+  CHECK(contains(told(data, DefaultLight::None), "light 0 % of what the camera sees: the picture stays dark"));
+  data.environment = EnvironmentData{nullptr, Spectrum(0), 0};
+  for (const DefaultLight kind : {DefaultLight::None, DefaultLight::Studio})
+    CHECK(contains(told(data, kind), "the environment is black, and the lights of the file light 0 %"));
+  data.lights[0].direction = {0, -1, 0};
+  CHECK(told(data, DefaultLight::None).empty());
+  data.environment.reset();
+  CHECK(told(data, DefaultLight::None).empty());
+  data.lights.clear();
+  data.materials[0].unlit = true;
+  CHECK(told(data, DefaultLight::None).empty());
+}
+
 TEST_CASE("Default light: no scene of the suite gets one") {
   for (const char* name : {"cornell", "door_ajar", "pool", "glass_of_water", "plates", "interior", "foliage"}) {
     CAPTURE(std::string(name));

@@ -151,7 +151,6 @@ std::unique_ptr<Scene> buildScene(SceneData data, const SceneChoice& c, const Ca
   options.isa = c.isa == "auto" ? "" : c.isa;
   options.full = c.full;
   auto scene = std::make_unique<Scene>(std::move(data), options);
-  if (c.defaultLight == DefaultLight::None || !c.environment.empty()) return scene;
   const std::optional<std::string> warning =
       lightIfDark(*scene, camera, c.size.width, c.size.height, static_cast<float>(c.lightScale), c.defaultLight);
   if (warning && !c.quiet) fmt::print(stderr, "warning: {}: {}\n", c.file, *warning);

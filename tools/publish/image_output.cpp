@@ -57,11 +57,15 @@ void bothWhateverFails(const std::function<void()>& one, const std::function<voi
 
 std::vector<std::string> timingsOf(const PipelineResult& combined) {
   std::vector<std::string> timings;
-  for (const PipelineOutput& out : combined.outputs)
-    if (out.ran())
-      timings.push_back(fmt::format("{} in {}, its inputs in {}; its mean is {:.2f} % of that of {}", out.step.name,
-                                    formatSeconds(out.seconds), formatSeconds(out.inputSeconds),
-                                    100 * out.meanOverUnbiased, out.step.unbiased));
+  for (const PipelineOutput& out : combined.outputs) {
+    if (!out.ran()) continue;
+    std::string text = fmt::format("{} in {}, its inputs in {}", out.step.name, formatSeconds(out.seconds),
+                                   formatSeconds(out.inputSeconds));
+    // Of a black picture there is no share.
+    if (std::isfinite(out.meanOverUnbiased))
+      text += fmt::format("; its mean is {:.2f} % of that of {}", 100 * out.meanOverUnbiased, out.step.unbiased);
+    timings.push_back(std::move(text));
+  }
   return timings;
 }
 
