@@ -22,7 +22,9 @@ constexpr uint64_t kPixelsOfPlace = 192, kMostPlaces = 2048;
 // light samples need not do.
 constexpr uint64_t kPasses = 16 * kSequenceBuckets;
 constexpr int kTried = 4;  // light samples, or directions, of the paths that are held against those with one
-constexpr double kPays = 1.2, kSplitsPay = 1.05;
+constexpr double kPays = 1.15, kSplitsPay = 1.05;
+// A gain of light samples between these is measured again at as many other places: chance might decide.
+constexpr double kHardlyPays = 1.03, kSurelyPays = 1.5;
 // Where light that comes straight from lamps is more than this share of the variance, directions have little to gain.
 constexpr double kMostDirectShare = 0.6;
 // Of a light sample with its shadow ray, in rays of paths with their shading.
@@ -34,13 +36,20 @@ constexpr double kDarkest = 0.1;
 // Means above this many times their place's brightness count as that.
 constexpr double kMostRelative = 8;
 
+// The number of samples with the least variance x cost.
+int bestCount(const SampleShares& shares) {
+  int best = 1;
+  for (int n = 2; n <= kTried; ++n)
+    if (sampleGain(shares, n) > sampleGain(shares, best)) best = n;
+  return best;
+}
+
 }  // namespace
 
 // Paths over a grid, with the render's points.
 class PathPreparation::Trial {
  public:
-  Trial(const TransportContext& context, const Plan& plan)
-      : context_(context), plan_(plan), grid_(plan.settings, places(plan.settings)) {
+  Trial(const TransportContext& context, const Plan& plan) : context_(context), plan_(plan), grid_(gridOf(plan)) {
     const Settings& s = plan.settings;
     const auto sampler = [&](uint64_t pass) { return PassSampler(s.sampler, s.seed, kStream, pass); };
     for (uint64_t k = 0; k < kPasses; ++k) {
@@ -48,26 +57,35 @@ class PathPreparation::Trial {
       if (s.sampler == SamplerKind::Sobol && pathSplitsMeasured(plan).yes)
         for (uint64_t b = 0; b < kTried; ++b) branches_.push_back(sampler(branchPass(k, b, kTried)));
     }
-    one_ = trace(1, 1);
+    one_ = trace(grid_, 1, 1);
   }
 
+  struct LightSamples {
+    SampleShares shares;
+    size_t paths = 0;
+  };
   // Variances are a + b / n, costs c + d n. With more light samples only direct light differs: the rest of the paths is
   // the same, noise that would hide what is looked for.
-  SampleShares lightSamples() const {
-    const Outcome more = trace(kTried, 1);
-    const std::vector<double> scale = inverseBrightness(one_.mean, more.mean);
-    return shares(relativeVariance(one_.mean, scale),
-                  relativeVariance(one_.direct, scale) - relativeVariance(more.direct, scale), one_.cost, more.cost);
+  LightSamples lightSamples() const {
+    Totals totals = lightSampleTotals(grid_, one_);
+    LightSamples found{shares(totals), paths()};
+    const double gain = sampleGain(found.shares, bestCount(found.shares));
+    if (gain < kHardlyPays || gain > kSurelyPays) return found;
+    const PixelGrid others = gridOf(plan_, true);
+    totals += lightSampleTotals(others, trace(others, 1, 1));
+    return {shares(totals), found.paths + 2 * kPasses * others.size()};
   }
   // Of paths with so many light samples: by all places, then with one part of them left out after the other.
   std::vector<SampleShares> directions(int lightSamples) const {
-    const Outcome one = lightSamples == 1 ? one_ : trace(lightSamples, 1), more = trace(lightSamples, kTried);
+    const Outcome one = lightSamples == 1 ? one_ : trace(grid_, lightSamples, 1);
+    const Outcome more = trace(grid_, lightSamples, kTried);
     const std::vector<double> scale = inverseBrightness(one.mean, more.mean);
     std::vector<SampleShares> found;
     for (size_t leftOut = 0; leftOut <= kParts; ++leftOut) {
       const size_t part = leftOut == 0 ? kParts : leftOut - 1;
       const double variance = relativeVariance(one.mean, scale, part);
-      found.push_back(shares(variance, variance - relativeVariance(more.mean, scale, part), one.cost, more.cost));
+      const double less = variance - relativeVariance(more.mean, scale, part);
+      found.push_back(shares({variance, less, one.cost, more.cost}));
     }
     return found;
   }
@@ -81,11 +99,21 @@ class PathPreparation::Trial {
   size_t paths() const { return 2 * kPasses * grid_.size(); }
 
  private:
-  static SampleShares shares(double variance, double less, double cost, double costOfMore) {
-    if (!(variance > 0) || !(cost > 0)) return {};
+  // With one sample or direction: variance, and how much less it is with kTried; costs of both.
+  struct Totals {
+    double variance = 0, less = 0, cost = 0, costOfMore = 0;
+    void operator+=(const Totals& o) {
+      variance += o.variance;
+      less += o.less;
+      cost += o.cost;
+      costOfMore += o.costOfMore;
+    }
+  };
+  static SampleShares shares(const Totals& t) {
+    if (!(t.variance > 0) || !(t.cost > 0)) return {};
     constexpr double kLess = 1 - 1.0 / kTried;
-    return {std::clamp(less / variance / kLess, 0.0, 1.0),
-            std::clamp((costOfMore / cost - 1) / (kTried - 1), 0.0, 1.0)};
+    return {std::clamp(t.less / t.variance / kLess, 0.0, 1.0),
+            std::clamp((t.costOfMore / t.cost - 1) / (kTried - 1), 0.0, 1.0)};
   }
 
   using Buckets = std::vector<std::array<float, kSequenceBuckets>>;  // means by place
@@ -94,17 +122,24 @@ class PathPreparation::Trial {
     double cost = 0;
   };
 
-  static uint64_t places(const Settings& s) {
-    const uint64_t pixels = static_cast<uint64_t>(s.width) * static_cast<uint64_t>(s.height);
-    return std::min(pixels / kPixelsOfPlace, kMostPlaces);
+  static PixelGrid gridOf(const Plan& plan, bool between = false) {
+    const uint64_t pixels = static_cast<uint64_t>(plan.settings.width) * static_cast<uint64_t>(plan.settings.height);
+    return PixelGrid(plan.settings, std::min(pixels / kPixelsOfPlace, kMostPlaces), between);
   }
 
-  Outcome trace(int lightSamples, int splits) const {
+  Totals lightSampleTotals(const PixelGrid& grid, const Outcome& one) const {
+    const Outcome more = trace(grid, kTried, 1);
+    const std::vector<double> scale = inverseBrightness(one.mean, more.mean);
+    return {relativeVariance(one.mean, scale),
+            relativeVariance(one.direct, scale) - relativeVariance(more.direct, scale), one.cost, more.cost};
+  }
+
+  Outcome trace(const PixelGrid& grid, int lightSamples, int splits) const {
     Outcome outcome;
-    outcome.mean.assign(grid_.size(), {});
+    outcome.mean.assign(grid.size(), {});
     outcome.direct = outcome.mean;
-    std::vector<double> costs((grid_.size() + kBatch - 1) / kBatch, 0.0);
-    parallelChunks(grid_.size(), kBatch, [&](size_t begin, size_t end) {
+    std::vector<double> costs((grid.size() + kBatch - 1) / kBatch, 0.0);
+    parallelChunks(grid.size(), kBatch, [&](size_t begin, size_t end) {
       for (uint64_t pass = 0; pass < kPasses; ++pass) {
         const PassSampler& sampler = samplers_[pass];
         const auto kernel = std::make_unique<PathKernel>(context_, plan_, sampler, nullptr);
@@ -112,7 +147,7 @@ class PathPreparation::Trial {
         if (splits > 1 && !branches_.empty()) aids.branches = {&branches_[pass * kTried], kTried};
         kernel->use(aids);
         for (size_t i = begin; i < end; ++i)
-          kernel->start(grid_.x(i), grid_.y(i), sampler.itemKey(pixelItem(plan_, grid_.x(i), grid_.y(i))));
+          kernel->start(grid.x(i), grid.y(i), sampler.itemKey(pixelItem(plan_, grid.x(i), grid.y(i))));
         kernel->run();
         for (size_t i = begin; i < end; ++i) {
           const PathSample& sample = kernel->sample(static_cast<int>(i - begin));
@@ -130,7 +165,7 @@ class PathPreparation::Trial {
 
   // 1 / the brightness of a place, as far as it is known, and never below a tenth of the mean of all.
   std::vector<double> inverseBrightness(const Buckets& a, const Buckets& b) const {
-    std::vector<double> scale(grid_.size());
+    std::vector<double> scale(a.size());
     double whole = 0;
     for (size_t i = 0; i < scale.size(); ++i) {
       for (size_t k = 0; k < kSequenceBuckets; ++k) scale[i] += static_cast<double>(a[i][k] + b[i][k]);
@@ -143,7 +178,7 @@ class PathPreparation::Trial {
 
   double relativeVariance(const Buckets& buckets, const std::vector<double>& scale, size_t leftOut = kParts) const {
     double total = 0;
-    for (size_t i = 0; i < grid_.size(); ++i) {
+    for (size_t i = 0; i < buckets.size(); ++i) {
       if (i % kParts == leftOut) continue;
       double sum = 0, squares = 0;
       for (const float mean : buckets[i]) {
@@ -169,9 +204,7 @@ double sampleGain(const SampleShares& shares, int count) {
 }
 
 int lightSamplesThatPay(const SampleShares& shares) {
-  int best = 1;
-  for (int n = 2; n <= kTried; ++n)
-    if (sampleGain(shares, n) > sampleGain(shares, best)) best = n;
+  const int best = bestCount(shares);
   return sampleGain(shares, best) >= kPays ? best : 1;
 }
 
@@ -223,10 +256,10 @@ PathPreparation::PathPreparation(const TransportContext& context, const Plan& pl
 }
 
 void PathPreparation::chooseLightSamples(const Trial& trial) {
-  const SampleShares shares = trial.lightSamples();
+  const auto [shares, paths] = trial.lightSamples();
   lightSamples_ = lightSamplesThatPay(shares);
   const std::string found = fmt::format("they are {:.0f} % of the variance and {:.0f} % of the cost of {} paths",
-                                        100 * shares.variance, 100 * shares.cost, trial.paths());
+                                        100 * shares.variance, 100 * shares.cost, paths);
   if (lightSamples_ > 1)
     decisions_.push_back({true, "light samples",
                           fmt::format("{} at the first surface, variance x cost is {:.2f} times less: {}",

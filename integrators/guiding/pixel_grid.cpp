@@ -12,11 +12,12 @@ int steps(int length, int stride) { return (length + stride - 1) / stride; }
 
 }  // namespace
 
-PixelGrid::PixelGrid(const Settings& s, uint64_t places) : width_(s.width), height_(s.height) {
+PixelGrid::PixelGrid(const Settings& s, uint64_t places, bool between) : width_(s.width), height_(s.height) {
   const auto count = [&](int stride) {
     return static_cast<uint64_t>(steps(width_, stride)) * static_cast<uint64_t>(steps(height_, stride));
   };
   while (count(stride_) > std::max<uint64_t>(places, 1)) ++stride_;
+  offset_ = between ? 0 : stride_ / 2;
   columns_ = steps(width_, stride_);
   rows_ = steps(height_, stride_);
 }

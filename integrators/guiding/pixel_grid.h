@@ -14,19 +14,19 @@ namespace braid {
 
 class PixelGrid {
  public:
-  // At most so many places, at least one.
-  PixelGrid(const Settings& settings, uint64_t places);
+  // At most so many places, at least one; `between`: the corners of those squares whose centres the others are.
+  PixelGrid(const Settings& settings, uint64_t places, bool between = false);
 
   size_t size() const { return static_cast<size_t>(columns_) * static_cast<size_t>(rows_); }
-  int x(size_t i) const { return std::min(static_cast<int>(i) % columns_ * stride_ + stride_ / 2, width_ - 1); }
-  int y(size_t i) const { return std::min(static_cast<int>(i) / columns_ * stride_ + stride_ / 2, height_ - 1); }
+  int x(size_t i) const { return std::min(static_cast<int>(i) % columns_ * stride_ + offset_, width_ - 1); }
+  int y(size_t i) const { return std::min(static_cast<int>(i) / columns_ * stride_ + offset_, height_ - 1); }
 
   // By place: 1 / its brightness, the mean over its surroundings and never below a tenth of the mean of all; 0 where
   // all is black. `mean` holds a value a place.
   std::vector<float> inverseBrightness(const std::vector<double>& mean) const;
 
  private:
-  int stride_ = 1, columns_, rows_, width_, height_;
+  int stride_ = 1, offset_ = 0, columns_, rows_, width_, height_;
 };
 
 }  // namespace braid
