@@ -24,6 +24,7 @@
 #include "combiners/pipeline/method_names.h"
 #include "combiners/pipeline/registry.h"
 #include "combiners/ensemble/scale_weights.h"
+#include "combiners/auto/albedo_noise.h"
 #include "combiners/auto/auto_filters.h"
 #include "combiners/auto/lost_light.h"
 #include "combiners/auto/refilter.h"
@@ -323,7 +324,8 @@ void AutoRun::giveLostLight() {
 
 void AutoRun::estimateError() {
   const Rgb<float>& noise = fused_.noise.empty() ? x_->variance : fused_.noise;
-  result_.error = mixtureErrorMap(result_.image.half, noise, result_.image.mean);
+  result_.error =
+      mixtureErrorMap(result_.image.half, noise, result_.image.mean, albedoNoise(result_.image.mean, in_.features));
   if (!fused_.squaredBias.empty()) addTo(result_.error, smoothedSquaredBias(fused_.squaredBias, result_.image.mean));
 }
 

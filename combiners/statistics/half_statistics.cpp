@@ -115,7 +115,8 @@ Plane<float> crossHalfErrorMap(const Rgb<float> (&halves)[2], const Estimate& un
   return out;
 }
 
-Plane<float> mixtureErrorMap(const Rgb<float> (&halves)[2], const Rgb<float>& variance, const Rgb<float>& guide) {
+Plane<float> mixtureErrorMap(const Rgb<float> (&halves)[2], const Rgb<float>& variance, const Rgb<float>& guide,
+                             const Plane<float>& shared) {
   Plane<float> spread = varianceSamples(halves);
   Plane<float> noise(guide.width(), guide.height(), kUnfilled);
   const Plane<float> unit = relativeUnits(guide);
@@ -133,7 +134,9 @@ Plane<float> mixtureErrorMap(const Rgb<float> (&halves)[2], const Rgb<float>& va
     for (size_t i = begin; i < end; ++i) {
       const auto s = static_cast<double>(wide[i]), v = static_cast<double>(noise[i]);
       const double ratio = v > s ? 1 / std::sqrt(1 / kMostFiltered + s / v) : 1;
-      spread[i] = finiteFloat(static_cast<double>(unit[i]) * static_cast<double>(spread[i]) * std::max(1.0, ratio));
+      double error = static_cast<double>(unit[i]) * static_cast<double>(spread[i]) * std::max(1.0, ratio);
+      if (!shared.empty() && v > s) error += sqr(1 - std::sqrt(s / v)) * static_cast<double>(shared[i]);
+      spread[i] = finiteFloat(error);
     }
   });
   return spread;

@@ -36,8 +36,10 @@ Plane<float> crossHalfErrorMap(const Rgb<float> (&halves)[2], const Estimate& un
 // The map of an image that is mixed, as its errors ask for it, of the unbiased image and of what filters make of it:
 //   u box3(s / u) / sqrt(1 / C + box15(s / u) / box15(v / u)),      s = ¼ (z_A - z_B)², C = 49,
 // but at least u box3(s / u). v is the variance of the unbiased image (combiners/README.md, Errors across halves). It
-// needs no halves but the image's own, and holds from four samples on.
-Plane<float> mixtureErrorMap(const Rgb<float> (&halves)[2], const Rgb<float>& variance, const Rgb<float>& guide);
+// needs no halves but the image's own, and holds from four samples on. `shared` is a squared error of what filters make
+// that both halves share (auto/albedo_noise.h), or empty: (1 - √(box15(s / u) / box15(v / u)))² of it are added.
+Plane<float> mixtureErrorMap(const Rgb<float> (&halves)[2], const Rgb<float>& variance, const Rgb<float>& guide,
+                             const Plane<float>& shared = {});
 
 // u max(0, box15(squaredBias / u)), u as above: of unbiased samples of a squared bias, which may be negative.
 Plane<float> smoothedSquaredBias(const Plane<float>& squaredBias, const Rgb<float>& guide);

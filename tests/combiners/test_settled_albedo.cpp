@@ -2,11 +2,14 @@
 // Noise of the albedo in images that were divided and multiplied by it: through glass, at edges, and in extreme values.
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <random>
 
 #include <doctest/doctest.h>
 
+#include "combiners/auto/albedo_noise.h"
 #include "combiners/auto/settled_albedo.h"
+#include "combiners/statistics/half_statistics.h"
 #include "combiners/pipeline/pipeline.h"
 #include "tests/support/combiner_fixture.h"
 
@@ -135,7 +138,42 @@ TEST_CASE("Misses, emitters and values that are no numbers stay as they are, and
   for (const float v : e.mean[0].data) CHECK((v > 0 && v <= 2 * kIrradiance));
 }
 
-TEST_CASE("auto settles the albedo at few samples, and leaves it with --auto-settle-albedo 0 and from 64 on") {
+TEST_CASE("Noise of the albedo is told as an error, as large as it is, where an image is filtered") {
+  const auto glass = [](int, int, float u) { return u < 0.25f ? 0.4f : 0.7f; };
+  const Features f = featuresOf(glass, 6);
+  const Estimate e = evenlyLit(f);
+  const Plane<float> noise = albedoNoise(e.mean, &f);
+  double told = 0;
+  for (const float v : noise.data) told += static_cast<double>(v);
+  CHECK(told == doctest::Approx(squaredError(e.mean, kIrradiance * 0.625f)).epsilon(0.1));  // four standard errors
+
+  const auto mean = [&](float variance) {
+    const Plane<float> map = mixtureErrorMap(e.half, Rgb<float>(kWidth, kHeight, variance), e.mean, noise);
+    double sum = 0;
+    for (const float v : map.data) sum += static_cast<double>(v);
+    return sum;
+  };
+  CHECK(mean(1) == doctest::Approx(told));  // halves without a spread: all is filtered
+  CHECK(mean(0) == 0);                      // x itself
+
+  Features strange = f;
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kMost = std::numeric_limits<float>::max();
+  for (size_t c = 0; c < 3; ++c) {
+    strange.albedo.mean[c].at(1, 1) = kNan;
+    strange.albedo.variance[c].at(2, 1) = kNan;
+    strange.albedo.variance[c].at(3, 1) = kMost;
+    strange.albedo.mean[c].at(4, 1) = 0;
+  }
+  strange.depth.mean.at(5, 1) = 0;
+  const Plane<float> sane = albedoNoise(e.mean, &strange);
+  for (const float v : sane.data) CHECK((std::isfinite(v) && v >= 0));
+  CHECK(sane.at(5, 1) == 0);
+  CHECK(albedoNoise(e.mean, nullptr).empty());
+}
+
+TEST_CASE(
+    "auto tells noise of the albedo and settles it at few samples, and leaves it with --auto-settle-albedo 0 and from "
+    "64 on") {
   for (const uint64_t samples : {4, 64}) {
     CaseOptions o;
     o.width = kWidth;
@@ -152,6 +190,14 @@ TEST_CASE("auto settles the albedo at few samples, and leaves it with --auto-set
     };
     CAPTURE(samples);
     CHECK((image(1) == image(0)) == (samples == 64));
+    const auto told = [&] {
+      const Plane<float> error = runPipeline(c.estimates, {"auto"}, {}).find("auto")->result.error;
+      return std::accumulate(error.data.begin(), error.data.end(), 0.0);
+    };
+    const double withNoise = told();
+    for (Plane<float>& plane : c.estimates.features->albedo.variance.channel)
+      std::fill(plane.data.begin(), plane.data.end(), 0.0f);
+    if (samples == 64) CHECK(withNoise > 1.5 * told());
   }
 }
 

@@ -17,6 +17,7 @@ import torch
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from network import KernelPrediction
 from train import validated
+from training import resume
 
 
 def main():
@@ -26,7 +27,7 @@ def main():
     print("samples", validated(lambda planes, irradiance, variance: irradiance, views))
     for path in sys.argv[2:]:
         model = KernelPrediction()
-        model.load_state_dict(torch.load(path)["model"])
+        resume(model, path)
         print(path, validated(model, views))
 
 

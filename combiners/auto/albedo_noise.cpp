@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combiners/auto/albedo_noise.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "combiners/pixels/finite_float.h"
+#include "renderer/core/parallel.h"
+
+namespace braid {
+
+namespace {
+
+constexpr float kMinAlbedo = 0.03f;  // what the filters divide by at least
+
+}  // namespace
+
+Plane<float> albedoNoise(const Rgb<float>& image, const Features* features) {
+  if (!features || features->albedo.mean.empty() || features->albedo.variance.empty()) return {};
+  const FeaturePlanes<Rgb<float>>& albedo = features->albedo;
+  const Plane<float>& depth = features->depth.mean;
+  Plane<float> noise(image.width(), image.height());
+  parallelChunks(noise.size(), kPixelChunk, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      if (!depth.empty() && depth[i] == 0) continue;
+      double sum = 0;
+      for (size_t c = 0; c < 3; ++c) {
+        const auto divisor = static_cast<double>(std::max(albedo.mean[c][i], kMinAlbedo));
+        sum += sqr(static_cast<double>(image[c][i]) / divisor) * static_cast<double>(albedo.variance[c][i]);
+      }
+      if (std::isfinite(sum)) noise[i] = finiteFloat(std::max(0.0, sum / 3));
+    }
+  });
+  return noise;
+}
+
+}  // namespace braid

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// What noise of the albedo leaves in an image that was filtered without it.
+#pragma once
+
+#include "renderer/film/estimates.h"
+#include "renderer/film/features.h"
+
+namespace braid {
+
+// Filters divide by the sampled albedo a, and multiply by it again: of an image z, z² var(a) / a² of its squared error
+// is noise of a (mean of the channels, of a at least what filters divide by). Both halves share it, so that nothing of
+// it shows between them. 0 where no surface is seen; empty without an albedo and its variance.
+Plane<float> albedoNoise(const Rgb<float>& image, const Features* features);
+
+}  // namespace braid
