@@ -54,9 +54,10 @@ struct Needs {
   // photon maps.
   bool anyBases = false;
   // A denoiser whose image is one of the bases below so many passes of the unbiased estimate, where it can run and the
-  // user names none; empty: there is none.
+  // user names none; empty: there is none. Beside photon maps, where it filters the fused image once more, it pays
+  // below fewer passes.
   std::string helper;
-  uint64_t helperBelow = 0;
+  uint64_t helperBelow = 0, helperBelowFused = 0;
 
   // Of the unbiased estimate.
   uint64_t passes = 2;

@@ -225,15 +225,17 @@ std::string CombinePlanner::fillBases(Step& step, const std::string& chosen) {
   return {};
 }
 
-// Not beside photon maps: the fused image would have to be filtered by it once more. Nor beside another denoiser where
-// there is a single pass, of which only one image is taken.
+// Of a single pass only one image is taken: another denoiser's, where there is one.
 void CombinePlanner::addHelper(Step& step, const Needs& needs) {
   const AvailableEstimate* e = available_.find(step.unbiased);
-  if (!options_.helpers || needs.helper.empty() || !e || e->passes >= needs.helperBelow) return;
+  if (!options_.helpers || needs.helper.empty() || !e) return;
+  const auto photonMaps = std::count_if(step.bases.begin(), step.bases.end(), [&](const std::string& name) {
+    const AvailableEstimate* base = available_.find(name);
+    return base && base->bias;
+  });
+  if (e->passes >= (photonMaps > 0 ? needs.helperBelowFused : needs.helperBelow)) return;
   if (std::count(step.bases.begin(), step.bases.end(), needs.helper)) return;
-  if (e->passes == 1 && !step.bases.empty()) return;
-  for (const std::string& name : step.bases)
-    if (const AvailableEstimate* base = available_.find(name); base && base->bias) return;
+  if (e->passes == 1 && photonMaps < static_cast<ptrdiff_t>(step.bases.size())) return;
   if (addStep(needs.helper).empty()) step.bases.push_back(needs.helper);
 }
 

@@ -162,10 +162,11 @@ TEST_CASE("What rays that miss see of the environment stays as sharp as it is, f
 
 TEST_CASE("kpn helps auto from few samples, and its image is kept only where it is asked for") {
   if (!dynamic_cast<const ExternalMethod&>(*findMethod("kpn")).skipReason().empty()) return;
-  const auto planOf = [](uint64_t passes, const std::vector<std::string>& wanted, const CombinePlanOptions& options) {
-    AvailableEstimates available;
-    available.features = true;
-    available.estimates = {{"pt", true, Correlation::Independent, passes}};
+  AvailableEstimates available;
+  available.features = true;
+  const auto planOf = [&](uint64_t passes, const std::vector<std::string>& wanted, const CombinePlanOptions& options) {
+    available.estimates.resize(1);
+    available.estimates[0] = {"pt", true, Correlation::Independent, passes};
     return makeCombinePlan(available, wanted, options);
   };
   for (const uint64_t passes : {1, 2, 255}) {
@@ -188,6 +189,15 @@ TEST_CASE("kpn helps auto from few samples, and its image is kept only where it 
   options.denoisers = {"nlm"};
   CHECK(planOf(4, {"auto"}, options).find("kpn"));
   CHECK_FALSE(planOf(1, {"auto"}, options).find("kpn"));  // one image is taken, the named one
+  // Photon maps, which are fused with the samples, leave the network less to do.
+  const auto besidePhotonMaps = [&](uint64_t passes) {
+    available.estimates = {{"pt", true, Correlation::Independent, passes},
+                           {"sppm", false, Correlation::Independent, passes}};
+    available.estimates[1].bias = true;
+    return makeCombinePlan(available, {"auto"}, {}).find("kpn") != nullptr;
+  };
+  for (const uint64_t passes : {1, 2, 15}) CHECK(besidePhotonMaps(passes));
+  CHECK_FALSE(besidePhotonMaps(16));
 }
 
 TEST_CASE("auto does without a helper that fails") {

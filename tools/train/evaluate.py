@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Relative squared errors of trained weights on views that training has not seen.
 
-    python3 tools/train/evaluate.py DATA WEIGHTS.pt [WEIGHTS.pt ...]
+    python3 tools/train/evaluate.py DATA WEIGHTS [WEIGHTS ...]
 
-Prints, for each file, the geometric mean over the views by number of samples; first that of the samples themselves.
+Prints, for each file (of a training, or a network that braid reads), the geometric mean over the views by number of
+samples; first that of the samples themselves.
 """
 
 import glob
@@ -12,7 +13,6 @@ import os
 import sys
 
 import numpy as np
-import torch
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from network import KernelPrediction
