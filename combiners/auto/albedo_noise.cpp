@@ -16,8 +16,14 @@ constexpr float kMinAlbedo = 0.03f;  // what the filters divide by at least
 }  // namespace
 
 Plane<float> albedoNoise(const Rgb<float>& image, const Features* features) {
-  if (!features || features->albedo.mean.empty() || features->albedo.variance.empty()) return {};
+  if (!features || features->albedo.mean.empty()) return {};
   const FeaturePlanes<Rgb<float>>& albedo = features->albedo;
+  const bool halves = !albedo.half[0].empty() && !albedo.half[1].empty();
+  if (!halves && albedo.variance.empty()) return {};
+  const auto variance = [&](size_t c, size_t i) {
+    if (!halves) return static_cast<double>(albedo.variance[c][i]);
+    return sqr(static_cast<double>(albedo.half[0][c][i]) - static_cast<double>(albedo.half[1][c][i])) / 4;
+  };
   const Plane<float>& depth = features->depth.mean;
   Plane<float> noise(image.width(), image.height());
   parallelChunks(noise.size(), kPixelChunk, [&](size_t begin, size_t end) {
@@ -26,7 +32,7 @@ Plane<float> albedoNoise(const Rgb<float>& image, const Features* features) {
       double sum = 0;
       for (size_t c = 0; c < 3; ++c) {
         const auto divisor = static_cast<double>(std::max(albedo.mean[c][i], kMinAlbedo));
-        sum += sqr(static_cast<double>(image[c][i]) / divisor) * static_cast<double>(albedo.variance[c][i]);
+        sum += sqr(static_cast<double>(image[c][i]) / divisor) * variance(c, i);
       }
       if (std::isfinite(sum)) noise[i] = finiteFloat(std::max(0.0, sum / 3));
     }

@@ -59,6 +59,14 @@ Estimate evenlyLit(const Features& f) {
   return e;
 }
 
+// The albedo so many standard deviations off.
+Rgb<float> shiftedAlbedo(const Features& f, float deviations) {
+  Rgb<float> out = f.albedo.mean;
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t i = 0; i < out.size(); ++i) out[c][i] += deviations * std::sqrt(f.albedo.variance[c][i]);
+  return out;
+}
+
 double squaredError(const Rgb<float>& image, float truth) {
   double sum = 0;
   for (const float v : image[0].data) sum += std::pow(static_cast<double>(v - truth), 2);
@@ -147,6 +155,12 @@ TEST_CASE("Noise of the albedo is told as an error, as large as it is, where an 
   for (const float v : noise.data) told += static_cast<double>(v);
   CHECK(told == doctest::Approx(squaredError(e.mean, kIrradiance * 0.625f)).epsilon(0.1));  // four standard errors
 
+  Features halved = f;  // halves tell the noise themselves, whatever variance is reported
+  for (size_t h = 0; h < 2; ++h) halved.albedo.half[h] = shiftedAlbedo(f, h == 0 ? 1.0f : -1.0f);
+  for (Plane<float>& plane : halved.albedo.variance.channel) std::fill(plane.data.begin(), plane.data.end(), 1e6f);
+  const Plane<float> ofHalves = albedoNoise(e.mean, &halved);
+  for (size_t i = 0; i < noise.size(); ++i) CHECK(ofHalves[i] == doctest::Approx(noise[i]).epsilon(1e-3));
+
   const auto mean = [&](float variance) {
     const Plane<float> map = mixtureErrorMap(e.half, Rgb<float>(kWidth, kHeight, variance), e.mean, noise);
     double sum = 0;
@@ -182,7 +196,8 @@ TEST_CASE(
     Case c = makeCase(o);
     std::erase_if(c.estimates.estimates, [](const Estimate& x) { return x.name != "pt"; });
     c.estimates.features->albedo = featuresOf([](int, int, float u) { return u < 0.25f ? 0.3f : 0.7f; }, 5).albedo;
-    c.estimates.features->albedo.half[0] = c.estimates.features->albedo.half[1] = c.estimates.features->albedo.mean;
+    for (size_t h = 0; h < 2; ++h)
+      c.estimates.features->albedo.half[h] = shiftedAlbedo(*c.estimates.features, h == 0 ? 1.0f : -1.0f);
     const auto image = [&](double settles) {
       PipelineOptions options;
       options.numbers.set("auto-settle-albedo", settles);
@@ -195,8 +210,7 @@ TEST_CASE(
       return std::accumulate(error.data.begin(), error.data.end(), 0.0);
     };
     const double withNoise = told();
-    for (Plane<float>& plane : c.estimates.features->albedo.variance.channel)
-      std::fill(plane.data.begin(), plane.data.end(), 0.0f);
+    c.estimates.features->albedo.half[0] = c.estimates.features->albedo.half[1];
     if (samples == 64) CHECK(withNoise > 1.5 * told());
   }
 }
