@@ -55,7 +55,7 @@ struct Needs {
   bool anyBases = false;
   // A denoiser whose image is one of the bases below so many passes of the unbiased estimate, where it can run and the
   // user names none; empty: there is none. Beside photon maps, where it filters the fused image once more, it pays
-  // below fewer passes.
+  // below fewer passes (combiners/EXPERIMENTS.md, kpn beside photon maps).
   std::string helper;
   uint64_t helperBelow = 0, helperBelowFused = 0;
 

@@ -51,7 +51,7 @@ const OptionInfo kFireflies{"auto-remove-fireflies", 1, "0: keep fireflies"};
 // samples).
 constexpr uint64_t kPartsPasses = 16, kShrinkPasses = 16;
 // From so many passes on the other filters are as good without a network (combiners/EXPERIMENTS.md, Kernel prediction).
-constexpr uint64_t kLearnedPasses = 256, kLearnedFusedPasses = 16;
+constexpr uint64_t kLearnedPasses = 256, kLearnedFusedPasses = 2;
 // From so many passes on the noise of the albedo is of no account (combiners/EXPERIMENTS.md, Noise of the albedo).
 constexpr uint64_t kSettledPasses = 64;
 constexpr int kNamedRange = 2;  // radius in pixels of the range that images of other denoisers are kept in

@@ -189,15 +189,15 @@ TEST_CASE("kpn helps auto from few samples, and its image is kept only where it 
   options.denoisers = {"nlm"};
   CHECK(planOf(4, {"auto"}, options).find("kpn"));
   CHECK_FALSE(planOf(1, {"auto"}, options).find("kpn"));  // one image is taken, the named one
-  // Photon maps, which are fused with the samples, leave the network less to do.
+  // Photon maps, which are fused with the samples, leave the network less to do than it costs, but for a single pass.
   const auto besidePhotonMaps = [&](uint64_t passes) {
     available.estimates = {{"pt", true, Correlation::Independent, passes},
                            {"sppm", false, Correlation::Independent, passes}};
     available.estimates[1].bias = true;
     return makeCombinePlan(available, {"auto"}, {}).find("kpn") != nullptr;
   };
-  for (const uint64_t passes : {1, 2, 15}) CHECK(besidePhotonMaps(passes));
-  CHECK_FALSE(besidePhotonMaps(16));
+  CHECK(besidePhotonMaps(1));
+  CHECK_FALSE(besidePhotonMaps(2));
 }
 
 TEST_CASE("auto does without a helper that fails") {
