@@ -7,8 +7,8 @@
 namespace braid {
 
 // Power heuristic with exponent 3/2, between Veach's 2 and the balance heuristic, for the technique with density `pdf`
-// against one other; the ratio form does not overflow. No scene has more noise by it than by either
-// (combiners/EXPERIMENTS.md, Weights of light and surface).
+// against one other; the ratio form does not overflow. No scene has more noise by it than by 2, as
+// some have by the balance heuristic (combiners/EXPERIMENTS.md, Weights of light and surface).
 inline float powerHeuristic(float pdf, float otherPdf) {
   if (!(pdf > 0)) return 0;
   const float ratio = otherPdf / pdf;

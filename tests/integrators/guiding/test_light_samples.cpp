@@ -126,7 +126,7 @@ TEST_CASE("light samples: where they pay chance seldom hides it, even in a small
       found += count >= 2 ? 1 : 0;
     }
   }
-  CHECK(found >= 41);  // of 48; 36 where one grid of places decides
+  CHECK(found >= 41);  // of 48
 }
 
 TEST_CASE("light samples: measured in frames that are worth it, and said") {
