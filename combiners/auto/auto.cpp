@@ -9,8 +9,8 @@
 //   6. take the noise of the albedo out of the result (settled_albedo.h);
 //   7. refilter it, where halves show its use (refilter.h);
 //   8. give it the light back that filters have lost (lost_light.h);
-//   9. estimate the error (half_statistics.h), with the squared bias that the photon maps leave.
-// x itself is no candidate: halves cannot see the error of a firefly in the half that holds it.
+//   9. average what the features of a few samples could not tell apart (feature_noise.h);
+//   10. estimate the error (half_statistics.h), with the squared bias that the photon maps leave.
 #include <algorithm>
 #include <array>
 
@@ -26,10 +26,11 @@
 #include "combiners/ensemble/scale_weights.h"
 #include "combiners/auto/albedo_noise.h"
 #include "combiners/auto/auto_filters.h"
+#include "combiners/auto/feature_noise.h"
 #include "combiners/auto/lost_light.h"
 #include "combiners/auto/refilter.h"
 #include "combiners/auto/settled_albedo.h"
-#include "combiners/shrinkage/shrinkage.h"
+#include "combiners/auto/shrunk_filters.h"
 #include "combiners/statistics/local_range_clamp.h"
 #include "renderer/film/make_attribute.h"
 
@@ -44,16 +45,21 @@ const OptionInfo kRefilter{"auto-refilter", 1, "0: the combined image is not fil
 const OptionInfo kAlbedo{"auto-settle-albedo", 1, "0: noise of the albedo stays"};
 const OptionInfo kDirectIndirect{"auto-direct-indirect", 1, "0: direct and indirect light are filtered together"};
 const OptionInfo kLostLight{"auto-lost-light", 1, "0: light that filters have lost is not given back"};
+const OptionInfo kFeatureNoise{"auto-feature-noise", 1, "0: noise of the features stays"};
 const OptionInfo kFireflies{"auto-remove-fireflies", 1, "0: keep fireflies"};
 
 // Fewer: the variances of direct and of indirect light are known worse than that of their sum, and x, whose variance is
 // too small wherever no firefly has fallen yet, is no image to be pulled to (combiners/EXPERIMENTS.md, Auto at few
 // samples).
 constexpr uint64_t kPartsPasses = 16, kShrinkPasses = 16;
+constexpr const char* kHelper = "kpn";
 // From so many passes on the other filters are as good without a network (combiners/EXPERIMENTS.md, Kernel prediction).
 constexpr uint64_t kLearnedPasses = 256, kLearnedFusedPasses = 2;
 // From so many passes on the noise of the albedo is of no account (combiners/EXPERIMENTS.md, Noise of the albedo).
 constexpr uint64_t kSettledPasses = 64;
+// From so many passes on it costs more than it gains to average what features cannot tell apart
+// (combiners/EXPERIMENTS.md, Noise of the features).
+constexpr uint64_t kFeatureNoisePasses = 8;
 constexpr int kNamedRange = 2;  // radius in pixels of the range that images of other denoisers are kept in
 
 class Auto : public Method {
@@ -66,7 +72,7 @@ class Auto : public Method {
   Needs needs() const override {
     Needs needs;
     needs.anyBases = true;
-    needs.helper = "kpn";
+    needs.helper = kHelper;
     needs.helperBelow = kLearnedPasses;
     needs.helperBelowFused = kLearnedFusedPasses;
     needs.helpful.features = needs.helpful.featureNoise = true;
@@ -75,7 +81,7 @@ class Auto : public Method {
   }
   MethodMemory memory(const MemoryCase& of) const override;
   std::vector<OptionInfo> options() const override {
-    return {kFuse, kDebias, kDirectIndirect, kShrink, kFireflies, kAlbedo, kRefilter, kLostLight};
+    return {kFuse, kDebias, kDirectIndirect, kShrink, kFireflies, kAlbedo, kRefilter, kLostLight, kFeatureNoise};
   }
   MethodResult run(const MethodInputs& in) const override;
 };
@@ -111,30 +117,6 @@ Estimate consistentHalves(const Estimate& base) {
       const float shift = base.mean[c][i] - 0.5f * (base.half[0][c][i] + base.half[1][c][i]);
       for (Rgb<float>& half : out.half) half[c][i] += shift;
     }
-  return out;
-}
-
-// x shrunk towards each base, and each half of x towards the base's half.
-std::vector<Estimate> shrunkTowards(const std::vector<Estimate>& bases, const Estimate& x,
-                                    const std::atomic<bool>* cancel) {
-  JamesSteinSettings settings;
-  settings.constant = 1;
-  settings.gate = true;
-  settings.shared = true;
-  settings.filter = VarianceFilter::Whitened;
-  settings.keepFactors = false;
-  std::vector<Estimate> out(bases.size());
-  for (size_t b = 0; b < bases.size(); ++b) out[b].name = "js@" + bases[b].name;
-  const auto shrink = [&](const Rgb<float>& image, const Rgb<float>& noise, const auto& partOf) {
-    const NoiseScale scale = noiseScale(noise, settings);
-    for (size_t b = 0; b < bases.size() && !(cancel && cancel->load()); ++b)
-      partOf(out[b]) = jamesStein(image, noise, scale, partOf(bases[b]), settings).image;
-  };
-  shrink(
-      x.mean, x.variance, [](auto& e) -> auto& { return e.mean; });
-  for (size_t h = 0; h < 2; ++h)
-    shrink(
-        x.half[h], halfVariance(x, x.variance, static_cast<int>(h)), [h](auto& e) -> auto& { return e.half[h]; });
   return out;
 }
 
@@ -190,10 +172,13 @@ class AutoRun {
   void settleCombined();
   void refilterCombined();
   void giveLostLight();
+  void averageFeatures();
   void estimateError();
 
   bool isOn(const OptionInfo& option) const { return in_.options.number(option) != 0; }
   bool removesFireflies() const { return isOn(kFireflies); }
+  // Whether filter f, or what is shrunk towards it, is made by dividing by the albedo of the samples.
+  bool isOwn(size_t f) const { return f >= others_.size() || others_[f]->name == kHelper; }
   // x, from now on an image that may be changed.
   Estimate& changeableX();
 
@@ -207,6 +192,7 @@ class AutoRun {
   std::vector<PixelValues> removed_;     // the fireflies of x as they were
   std::vector<PixelValues> judging_;     // and as candidates are judged by them
   std::vector<Estimate> filters_, shrunk_;
+  Plane<float> own_;  // what of the image isOwn() filters made; empty: all
   MethodResult result_;
 };
 
@@ -222,6 +208,7 @@ MethodResult AutoRun::run() {
   }
   if (in_.firstPass && !others_.empty()) {
     result_.image = std::move(filters_.front());  // what halves that were made of one image say of others is chance
+    if (isOwn(0)) averageFeatures();
     return std::move(result_);
   }
   shrink();
@@ -229,6 +216,7 @@ MethodResult AutoRun::run() {
   if (!in_.cancelled()) settleCombined();
   if (!in_.cancelled()) refilterCombined();
   if (!in_.cancelled()) giveLostLight();
+  if (!in_.cancelled()) averageFeatures();
   if (!in_.cancelled() && !in_.firstPass) estimateError();  // halves that were made tell nothing
   return std::move(result_);
 }
@@ -297,6 +285,11 @@ void AutoRun::combine() {
   if (in_.cancelled()) return;
   result_.image = weightedEstimate(weights, candidates);
   std::vector<Plane<float>> maps = channelMeans(weights);
+  if (!others_.empty()) {
+    own_ = Plane<float>(x_->mean.width(), x_->mean.height(), 0.0f);
+    for (size_t b = 0; b < candidates.size(); ++b)
+      if (isOwn(b % filters_.size())) addTo(own_, maps[b]);
+  }
   for (size_t b = 0; b < candidates.size(); ++b)
     result_.aovs.push_back({"weight.auto." + layerName(candidates[b]->name), std::move(maps[b])});
   shrunk_.clear();  // their memory is what refiltering and the error map need
@@ -321,6 +314,12 @@ void AutoRun::giveLostLight() {
   const std::optional<Estimate> brighter = withLostLight(result_.image, *x_, in_.features);
   if (brighter) chooseBetween(*x_, *brighter, "lost-light", in_, result_);
   if (!removed_.empty()) swapPixels(changeableX(), removed_);
+}
+
+void AutoRun::averageFeatures() {
+  const uint64_t passes = in_.firstPass ? 1 : passesOf(*x_);
+  if (isOn(kFeatureNoise) && passes < kFeatureNoisePasses)
+    averageFeatureNoise(result_.image, in_.features, passes, own_, in_.cancel);
 }
 
 void AutoRun::estimateError() {
