@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Embree 3 and 4 differ only in how a query gets its context: see the functions under BRAID_EMBREE4.
 #include "renderer/scene/accel.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <new>
 
 #include "renderer/core/error.h"
 #include "renderer/scene/coincident.h"
-
-#if RTC_VERSION_MAJOR >= 4
-#define BRAID_EMBREE4 1
-#endif
+#include "renderer/scene/embree_queries.h"
 
 namespace braid {
 
@@ -48,35 +45,6 @@ bool isBackFace(const RTCFilterFunctionNArguments* args, unsigned i) {
   // mirrored or not, because normals transform by the inverse transpose.
   return glm::dot(direction, ng) > 0;
 }
-
-#ifdef BRAID_EMBREE4
-void embreeIntersect1(RTCScene scene, RTCRayHit& q) { rtcIntersect1(scene, &q, nullptr); }
-void embreeOccluded1(RTCScene scene, RTCRay& q) { rtcOccluded1(scene, &q, nullptr); }
-void embreeIntersect8(const int* valid, RTCScene scene, RTCRayHit8& q) { rtcIntersect8(valid, scene, &q, nullptr); }
-void embreeOccluded8(const int* valid, RTCScene scene, RTCRay8& q) { rtcOccluded8(valid, scene, &q, nullptr); }
-#else
-RTCIntersectContext plainContext() {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  return context;
-}
-void embreeIntersect1(RTCScene scene, RTCRayHit& q) {
-  RTCIntersectContext context = plainContext();
-  rtcIntersect1(scene, &context, &q);
-}
-void embreeOccluded1(RTCScene scene, RTCRay& q) {
-  RTCIntersectContext context = plainContext();
-  rtcOccluded1(scene, &context, &q);
-}
-void embreeIntersect8(const int* valid, RTCScene scene, RTCRayHit8& q) {
-  RTCIntersectContext context = plainContext();
-  rtcIntersect8(valid, scene, &context, &q);
-}
-void embreeOccluded8(const int* valid, RTCScene scene, RTCRay8& q) {
-  RTCIntersectContext context = plainContext();
-  rtcOccluded8(valid, scene, &context, &q);
-}
-#endif
 
 }  // namespace
 
@@ -124,7 +92,7 @@ void Accel::attachMesh(RTCScene scene, uint32_t meshIndex, const AccelInput& inp
     filterData_.push_back(std::make_unique<FilterData>(FilterData{filter_, meshIndex}));
     rtcSetGeometryUserData(geometry, filterData_.back().get());
     rtcSetGeometryIntersectFilterFunction(geometry, filterCallback);
-    rtcSetGeometryOccludedFilterFunction(geometry, filterCallback);
+    rtcSetGeometryOccludedFilterFunction(geometry, occlusionCallback);
   }
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(scene, geometry);
@@ -283,22 +251,34 @@ void Accel::coincidentCallback(const RTCFilterFunctionNArguments* args) {
 }
 
 void Accel::occluded(ShadowBatch& rays, int count, bool* results) const {
+  for (int first = 0; first < count; first += kPacket)
+    occludedPacket(rays, first, std::min(kPacket, count - first), results, nullptr);
+}
+
+void Accel::occluded(ShadowBatch& rays, int count, bool* results, float* passing) const {
   for (int first = 0; first < count; first += kPacket) {
     const int lanes = std::min(kPacket, count - first);
-    if (!packets_ || lanes == 1) {
-      for (int i = first; i < first + lanes; ++i) {
-        RTCRay ray = singleRay(rays.get(i));
-        embreeOccluded1(scene_, ray);
-        results[i] = ray.tfar < 0;
-      }
-      continue;
-    }
-    RTCRay8& query = rays.packet(first);
-    alignas(32) int valid[kPacket];
-    for (int i = 0; i < kPacket; ++i) valid[i] = i < lanes ? -1 : 0;
-    embreeOccluded8(valid, scene_, query);
-    for (int i = 0; i < lanes; ++i) results[first + i] = query.tfar[i] < 0;
+    std::array<CrossedSurfaces, kPacket> crossed;
+    occludedPacket(rays, first, lanes, results, crossed.data());
+    for (int i = 0; i < lanes; ++i) passing[first + i] = crossed[static_cast<size_t>(i)].passing();
   }
+}
+
+// `crossed`: null, or one a lane.
+void Accel::occludedPacket(ShadowBatch& rays, int first, int lanes, bool* results, CrossedSurfaces* crossed) const {
+  if (!packets_ || lanes == 1) {
+    for (int i = 0; i < lanes; ++i) {
+      RTCRay ray = singleRay(rays.get(first + i));
+      embreeOccluded1(scene_, ray, crossed ? crossed + i : nullptr);
+      results[first + i] = ray.tfar < 0;
+    }
+    return;
+  }
+  RTCRay8& query = rays.packet(first);
+  alignas(32) int valid[kPacket];
+  for (int i = 0; i < kPacket; ++i) valid[i] = i < lanes ? -1 : 0;
+  embreeOccluded8(valid, scene_, query, crossed);
+  for (int i = 0; i < lanes; ++i) results[first + i] = query.tfar[i] < 0;
 }
 
 void Accel::filterCallback(const RTCFilterFunctionNArguments* args) {
@@ -308,6 +288,23 @@ void Accel::filterCallback(const RTCFilterFunctionNArguments* args) {
     if (data->filter->passThrough(data->mesh, RTCHitN_primID(args->hit, args->N, i), RTCHitN_u(args->hit, args->N, i),
                                   RTCHitN_v(args->hit, args->N, i), isBackFace(args, i),
                                   RTCRayN_id(args->ray, args->N, i)))
+      args->valid[i] = 0;
+  }
+}
+
+// Collects what is partly covered, where the query asks for it.
+void Accel::occlusionCallback(const RTCFilterFunctionNArguments* args) {
+  CrossedSurfaces* crossed = static_cast<const OcclusionContext*>(args->context)->crossed;
+  if (!crossed) return filterCallback(args);
+  const auto* data = static_cast<const FilterData*>(args->geometryUserPtr);
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (args->valid[i] != -1) continue;
+    const uint32_t triangle = RTCHitN_primID(args->hit, args->N, i),
+                   instance = RTCHitN_instID(args->hit, args->N, i, 0);
+    const float u = RTCHitN_u(args->hit, args->N, i), v = RTCHitN_v(args->hit, args->N, i);
+    const float passing =
+        data->filter->passing(data->mesh, triangle, u, v, isBackFace(args, i), RTCRayN_id(args->ray, args->N, i));
+    if (passing >= 1 || (passing > 0 && crossed[i].add(instance, data->mesh, triangle, u, v, passing)))
       args->valid[i] = 0;
   }
 }

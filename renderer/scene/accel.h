@@ -101,6 +101,7 @@ struct GroupInstance {
 };
 
 class CoincidentFaces;
+class CrossedSurfaces;
 
 struct AccelInput {
   const std::vector<TriangleMesh>* meshes = nullptr;
@@ -120,6 +121,8 @@ class HitFilter {
  public:
   virtual ~HitFilter() = default;
   virtual bool passThrough(uint32_t mesh, uint32_t triangle, float u, float v, bool backFace, uint32_t salt) const = 0;
+  // The probability that it does, over all salts of such rays.
+  virtual float passing(uint32_t mesh, uint32_t triangle, float u, float v, bool backFace, uint32_t salt) const = 0;
 };
 
 class Accel {
@@ -138,6 +141,9 @@ class Accel {
   void intersect(RayBatch& rays, int count, RayHit* hits) const;
   // results[i] = whether anything lies in (0, tmax) of ray i. Consumes the rays.
   void occluded(ShadowBatch& rays, int count, bool* results) const;
+  // The same where partly covered surfaces let their share of the light pass instead of some of the rays:
+  // passing[i] is the share of ray i that is left, unless something hides it.
+  void occluded(ShadowBatch& rays, int count, bool* results, float* passing) const;
 
   // Bytes that Embree holds (hierarchies, not the shared buffers).
   size_t bytes() const { return bytes_; }
@@ -149,6 +155,7 @@ class Accel {
   RTCScene newScene() const;
   void attachMesh(RTCScene scene, uint32_t mesh, const AccelInput& input);
   void intersectSingle(const RayQuery& ray, RayHit& hit) const;
+  void occludedPacket(ShadowBatch& rays, int first, int lanes, bool* results, CrossedSurfaces* crossed) const;
   // Replaces a hit from behind by that of a face in the same place that faces the ray. `ng` is the hit's normal in the
   // coordinates of its mesh.
   void preferFacing(const RayQuery& ray, const Vec3& ng, RayHit& hit) const;
@@ -175,6 +182,7 @@ class Accel {
   struct FilterData;  // per Embree geometry, for the callback
   std::vector<std::unique_ptr<FilterData>> filterData_;
   static void filterCallback(const RTCFilterFunctionNArguments* args);
+  static void occlusionCallback(const RTCFilterFunctionNArguments* args);
   static void coincidentCallback(const RTCFilterFunctionNArguments* args);
 };
 

@@ -306,20 +306,23 @@ float Scene::alpha(const TriangleMesh& mesh, uint32_t triangle, float u, float v
   return std::clamp(a, 0.0f, 1.0f);
 }
 
-bool Scene::passThrough(uint32_t meshIndex, uint32_t triangle, float u, float v, bool backFace, uint32_t salt) const {
+float Scene::passing(uint32_t meshIndex, uint32_t triangle, float u, float v, bool backFace, uint32_t salt) const {
   const TriangleMesh& m = data_.meshes[meshIndex];
   const Material& mat = material(m);
   // TRAP: culling is one-way, so it must not take part in transport: light that passes a wall from behind could not be
   // traced from the light, which meets the wall's front.
   if (backFace && (salt & kCameraRay) && !mat.doubleSided && !mat.transmissive() && mat.diffuseTransmission == 0)
-    return true;
-  if (mat.alphaMode == AlphaMode::Opaque) return false;
-  const float a = alpha(m, triangle, u, v);
-  if (a <= 0) return true;
-  if (a >= 1) return false;
+    return 1;
+  return mat.alphaMode == AlphaMode::Opaque ? 0 : 1 - alpha(m, triangle, u, v);
+}
+
+bool Scene::passThrough(uint32_t meshIndex, uint32_t triangle, float u, float v, bool backFace, uint32_t salt) const {
+  const float share = passing(meshIndex, triangle, u, v, backFace, salt);
+  if (share >= 1) return true;
+  if (share <= 0) return false;
   // Coverage decided once per ray and triangle: the same answer if Embree asks twice.
   const uint32_t h = mix32(mix32((salt & ~kCameraRay) ^ (meshIndex * 0x9e3779b9u)) ^ triangle);
-  return static_cast<float>(h >> 8) * 0x1p-24f >= a;
+  return static_cast<float>(h >> 8) * 0x1p-24f >= 1 - share;
 }
 
 size_t Scene::textureBytes() const {

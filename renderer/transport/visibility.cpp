@@ -22,6 +22,7 @@ struct VisibilityBatch::Panes {
 
 VisibilityBatch::VisibilityBatch(const TransportContext& context) : scene_(context.scene) {
   if (scene_.traits().has(kTraitPanes)) panes_ = std::make_unique<Panes>(context);
+  blends_ = !panes_ && scene_.traits().has(kTraitAlphaBlend);
 }
 
 VisibilityBatch::~VisibilityBatch() = default;
@@ -30,9 +31,13 @@ void VisibilityBatch::setIndex(int i, float index) { panes_->index[static_cast<s
 
 const Spectrum& VisibilityBatch::transmittance(int i) const { return panes_->transmittance[static_cast<size_t>(i)]; }
 
-void VisibilityBatch::traceOpaque(int count) { scene_.accel().occluded(rays_, count, hidden_.data()); }
+void VisibilityBatch::traceOpaque(int count) {
+  if (blends_) passing_.fill(1);
+  scene_.accel().occluded(rays_, count, hidden_.data());
+}
 
 void VisibilityBatch::trace(int count) {
+  if (blends_) return scene_.accel().occluded(rays_, count, hidden_.data(), passing_.data());
   if (!panes_) return traceOpaque(count);
   Panes& p = *panes_;
   for (int i = 0; i < count; ++i) {
