@@ -159,40 +159,52 @@ void Accel::resolve(uint32_t geometry, uint32_t instance, RayHit& hit) const {
 }
 
 void Accel::intersect(RayBatch& rays, int count, RayHit* hits) const {
+  for (int first = 0; first < count; first += kPacket)
+    intersectPacket(rays, first, std::min(kPacket, count - first), hits, nullptr);
+}
+
+void Accel::intersect(RayBatch& rays, int count, RayHit* hits, float* passing) const {
   for (int first = 0; first < count; first += kPacket) {
     const int lanes = std::min(kPacket, count - first);
-    if (!packets_ || lanes == 1) {
-      for (int i = first; i < first + lanes; ++i) intersectSingle(rays.get(i), hits[i]);
-      continue;
-    }
-    RTCRayHit8& query = rays.packet(first);
-    alignas(32) int valid[kPacket];
-    for (int i = 0; i < kPacket; ++i) {
-      valid[i] = i < lanes ? -1 : 0;
-      query.hit.geomID[i] = query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-    }
-    embreeIntersect8(valid, scene_, query);
-    for (int i = 0; i < lanes; ++i) {
-      RayHit& hit = hits[first + i];
-      const bool found = query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
-      hit.t = found ? query.ray.tfar[i] : kInfinity;
-      if (!found) continue;
-      hit.u = query.hit.u[i];
-      hit.v = query.hit.v[i];
-      hit.triangle = query.hit.primID[i];
-      hit.time = query.ray.time[i];
-      resolve(query.hit.geomID[i], query.hit.instID[0][i], hit);
-      if (coincident_)
-        preferFacing(rays.get(first + i), {query.hit.Ng_x[i], query.hit.Ng_y[i], query.hit.Ng_z[i]}, hit);
-    }
+    std::array<CrossedSurfaces, kPacket> crossed;
+    intersectPacket(rays, first, lanes, hits, crossed.data());
+    for (int i = 0; i < lanes; ++i) passing[first + i] = crossed[static_cast<size_t>(i)].passing(hits[first + i].t);
   }
 }
 
-void Accel::intersectSingle(const RayQuery& ray, RayHit& hit) const {
+// `crossed`: null, or one a lane.
+void Accel::intersectPacket(RayBatch& rays, int first, int lanes, RayHit* hits, CrossedSurfaces* crossed) const {
+  if (!packets_ || lanes == 1) {
+    for (int i = 0; i < lanes; ++i)
+      intersectSingle(rays.get(first + i), hits[first + i], crossed ? crossed + i : nullptr);
+    return;
+  }
+  RTCRayHit8& query = rays.packet(first);
+  alignas(32) int valid[kPacket];
+  for (int i = 0; i < kPacket; ++i) {
+    valid[i] = i < lanes ? -1 : 0;
+    query.hit.geomID[i] = query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+  embreeIntersect8(valid, scene_, query, FilterContext(crossed));
+  for (int i = 0; i < lanes; ++i) {
+    RayHit& hit = hits[first + i];
+    const bool found = query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+    hit.t = found ? query.ray.tfar[i] : kInfinity;
+    if (!found) continue;
+    hit.u = query.hit.u[i];
+    hit.v = query.hit.v[i];
+    hit.triangle = query.hit.primID[i];
+    hit.time = query.ray.time[i];
+    resolve(query.hit.geomID[i], query.hit.instID[0][i], hit);
+    if (coincident_) preferFacing(rays.get(first + i), {query.hit.Ng_x[i], query.hit.Ng_y[i], query.hit.Ng_z[i]}, hit);
+  }
+}
+
+void Accel::intersectSingle(const RayQuery& ray, RayHit& hit, CrossedSurfaces* crossed) const {
   RTCRayHit query;
   query.ray = singleRay(ray);
   query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  embreeIntersect1(scene_, query);
+  embreeIntersect1(scene_, query, FilterContext(crossed));
   hit.t = kInfinity;
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
   hit.t = query.ray.tfar;
@@ -229,7 +241,7 @@ void Accel::preferFacing(const RayQuery& ray, const Vec3& ng, RayHit& hit) const
   query.ray.tnear = std::max(0.0f, hit.t - reach);
   query.ray.tfar = hit.t + reach;
   query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  embreeIntersect1(coincidentScene_, query);
+  embreeIntersect1(coincidentScene_, query, FilterContext(nullptr));
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
   const CoincidentFaces::Face& face = coincident_->faces()[query.hit.primID];
   const RayHit found{query.ray.tfar, query.hit.u, query.hit.v, face.mesh, face.triangle, face.instance, hit.time};
@@ -260,7 +272,7 @@ void Accel::occluded(ShadowBatch& rays, int count, bool* results, float* passing
     const int lanes = std::min(kPacket, count - first);
     std::array<CrossedSurfaces, kPacket> crossed;
     occludedPacket(rays, first, lanes, results, crossed.data());
-    for (int i = 0; i < lanes; ++i) passing[first + i] = crossed[static_cast<size_t>(i)].passing();
+    for (int i = 0; i < lanes; ++i) passing[first + i] = crossed[static_cast<size_t>(i)].passing(kInfinity);
   }
 }
 
@@ -269,7 +281,7 @@ void Accel::occludedPacket(ShadowBatch& rays, int first, int lanes, bool* result
   if (!packets_ || lanes == 1) {
     for (int i = 0; i < lanes; ++i) {
       RTCRay ray = singleRay(rays.get(first + i));
-      embreeOccluded1(scene_, ray, crossed ? crossed + i : nullptr);
+      embreeOccluded1(scene_, ray, FilterContext(crossed ? crossed + i : nullptr));
       results[first + i] = ray.tfar < 0;
     }
     return;
@@ -277,11 +289,13 @@ void Accel::occludedPacket(ShadowBatch& rays, int first, int lanes, bool* result
   RTCRay8& query = rays.packet(first);
   alignas(32) int valid[kPacket];
   for (int i = 0; i < kPacket; ++i) valid[i] = i < lanes ? -1 : 0;
-  embreeOccluded8(valid, scene_, query, crossed);
+  embreeOccluded8(valid, scene_, query, FilterContext(crossed));
   for (int i = 0; i < lanes; ++i) results[first + i] = query.tfar[i] < 0;
 }
 
 void Accel::filterCallback(const RTCFilterFunctionNArguments* args) {
+  if (CrossedSurfaces* crossed = static_cast<const FilterContext*>(args->context)->crossed)
+    return collectCrossed(args, crossed, false);
   const auto* data = static_cast<const FilterData*>(args->geometryUserPtr);
   for (unsigned i = 0; i < args->N; ++i) {
     if (args->valid[i] != -1) continue;
@@ -292,20 +306,26 @@ void Accel::filterCallback(const RTCFilterFunctionNArguments* args) {
   }
 }
 
-// Collects what is partly covered, where the query asks for it.
 void Accel::occlusionCallback(const RTCFilterFunctionNArguments* args) {
-  CrossedSurfaces* crossed = static_cast<const OcclusionContext*>(args->context)->crossed;
-  if (!crossed) return filterCallback(args);
+  if (CrossedSurfaces* crossed = static_cast<const FilterContext*>(args->context)->crossed)
+    return collectCrossed(args, crossed, true);
+  filterCallback(args);
+}
+
+// Rays pass what is covered in part, and keep it; panes stop them where they are not to be kept.
+void Accel::collectCrossed(const RTCFilterFunctionNArguments* args, CrossedSurfaces* crossed, bool panesToo) {
   const auto* data = static_cast<const FilterData*>(args->geometryUserPtr);
+  const bool keeps = panesToo || !data->filter->mayBePane(data->mesh);
   for (unsigned i = 0; i < args->N; ++i) {
     if (args->valid[i] != -1) continue;
     const uint32_t triangle = RTCHitN_primID(args->hit, args->N, i),
                    instance = RTCHitN_instID(args->hit, args->N, i, 0);
-    const float u = RTCHitN_u(args->hit, args->N, i), v = RTCHitN_v(args->hit, args->N, i);
+    const float u = RTCHitN_u(args->hit, args->N, i), v = RTCHitN_v(args->hit, args->N, i),
+                t = RTCRayN_tfar(args->ray, args->N, i);
     const float passing =
         data->filter->passing(data->mesh, triangle, u, v, isBackFace(args, i), RTCRayN_id(args->ray, args->N, i));
-    if (passing >= 1 || (passing > 0 && crossed[i].add(instance, data->mesh, triangle, u, v, passing)))
-      args->valid[i] = 0;
+    const bool kept = passing > 0 && keeps && crossed[i].add(instance, data->mesh, triangle, u, v, t, passing);
+    if (passing >= 1 || kept) args->valid[i] = 0;
   }
 }
 

@@ -123,6 +123,7 @@ class HitFilter {
   virtual bool passThrough(uint32_t mesh, uint32_t triangle, float u, float v, bool backFace, uint32_t salt) const = 0;
   // The probability that it does, over all salts of such rays.
   virtual float passing(uint32_t mesh, uint32_t triangle, float u, float v, bool backFace, uint32_t salt) const = 0;
+  virtual bool mayBePane(uint32_t mesh) const = 0;
 };
 
 class Accel {
@@ -139,6 +140,9 @@ class Accel {
   // TRAP: not as frusta (Embree's coherent rays), although camera rays would be faster: of two surfaces in one place
   // they meet another one than single rays do, and then paths from the camera and from lights see different scenes.
   void intersect(RayBatch& rays, int count, RayHit* hits) const;
+  // The same where what is covered in part, but for panes, lets its share of the light pass instead of some of the
+  // rays: passing[i] is the share of ray i that is left at its hit, 0 where the hit is one thing too many.
+  void intersect(RayBatch& rays, int count, RayHit* hits, float* passing) const;
   // results[i] = whether anything lies in (0, tmax) of ray i. Consumes the rays.
   void occluded(ShadowBatch& rays, int count, bool* results) const;
   // The same where partly covered surfaces let their share of the light pass instead of some of the rays:
@@ -154,7 +158,8 @@ class Accel {
  private:
   RTCScene newScene() const;
   void attachMesh(RTCScene scene, uint32_t mesh, const AccelInput& input);
-  void intersectSingle(const RayQuery& ray, RayHit& hit) const;
+  void intersectPacket(RayBatch& rays, int first, int lanes, RayHit* hits, CrossedSurfaces* crossed) const;
+  void intersectSingle(const RayQuery& ray, RayHit& hit, CrossedSurfaces* crossed) const;
   void occludedPacket(ShadowBatch& rays, int first, int lanes, bool* results, CrossedSurfaces* crossed) const;
   // Replaces a hit from behind by that of a face in the same place that faces the ray. `ng` is the hit's normal in the
   // coordinates of its mesh.
@@ -182,6 +187,7 @@ class Accel {
   struct FilterData;  // per Embree geometry, for the callback
   std::vector<std::unique_ptr<FilterData>> filterData_;
   static void filterCallback(const RTCFilterFunctionNArguments* args);
+  static void collectCrossed(const RTCFilterFunctionNArguments* args, CrossedSurfaces* crossed, bool panesToo);
   static void occlusionCallback(const RTCFilterFunctionNArguments* args);
   static void coincidentCallback(const RTCFilterFunctionNArguments* args);
 };

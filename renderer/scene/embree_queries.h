@@ -19,50 +19,50 @@ using QueryContext = RTCIntersectContext;
 inline void initialise(QueryContext& context) { rtcInitIntersectContext(&context); }
 #endif
 
-// What the filter of a query for occlusion finds: `crossed`, where it collects, has an entry a lane.
-struct OcclusionContext : QueryContext {
-  explicit OcclusionContext(CrossedSurfaces* surfaces) : crossed(surfaces) { initialise(*this); }
+// What the filters of a query find: `crossed`, where they collect, has an entry a lane.
+struct FilterContext : QueryContext {
+  explicit FilterContext(CrossedSurfaces* surfaces) : crossed(surfaces) { initialise(*this); }
   CrossedSurfaces* crossed;
 };
 
 #ifdef BRAID_EMBREE4
-inline void embreeIntersect1(RTCScene scene, RTCRayHit& q) { rtcIntersect1(scene, &q, nullptr); }
-inline void embreeIntersect8(const int* valid, RTCScene scene, RTCRayHit8& q) {
-  rtcIntersect8(valid, scene, &q, nullptr);
+inline RTCIntersectArguments intersectArguments(FilterContext& context) {
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.context = &context;
+  return arguments;
 }
-inline RTCOccludedArguments argumentsOf(OcclusionContext& context) {
+inline RTCOccludedArguments occludedArguments(FilterContext& context) {
   RTCOccludedArguments arguments;
   rtcInitOccludedArguments(&arguments);
   arguments.context = &context;
   return arguments;
 }
-inline void embreeOccluded1(RTCScene scene, RTCRay& q, CrossedSurfaces* crossed) {
-  OcclusionContext context(crossed);
-  RTCOccludedArguments arguments = argumentsOf(context);
+inline void embreeIntersect1(RTCScene scene, RTCRayHit& q, FilterContext context) {
+  RTCIntersectArguments arguments = intersectArguments(context);
+  rtcIntersect1(scene, &q, &arguments);
+}
+inline void embreeIntersect8(const int* valid, RTCScene scene, RTCRayHit8& q, FilterContext context) {
+  RTCIntersectArguments arguments = intersectArguments(context);
+  rtcIntersect8(valid, scene, &q, &arguments);
+}
+inline void embreeOccluded1(RTCScene scene, RTCRay& q, FilterContext context) {
+  RTCOccludedArguments arguments = occludedArguments(context);
   rtcOccluded1(scene, &q, &arguments);
 }
-inline void embreeOccluded8(const int* valid, RTCScene scene, RTCRay8& q, CrossedSurfaces* crossed) {
-  OcclusionContext context(crossed);
-  RTCOccludedArguments arguments = argumentsOf(context);
+inline void embreeOccluded8(const int* valid, RTCScene scene, RTCRay8& q, FilterContext context) {
+  RTCOccludedArguments arguments = occludedArguments(context);
   rtcOccluded8(valid, scene, &q, &arguments);
 }
 #else
-inline void embreeIntersect1(RTCScene scene, RTCRayHit& q) {
-  QueryContext context;
-  initialise(context);
+inline void embreeIntersect1(RTCScene scene, RTCRayHit& q, FilterContext context) {
   rtcIntersect1(scene, &context, &q);
 }
-inline void embreeIntersect8(const int* valid, RTCScene scene, RTCRayHit8& q) {
-  QueryContext context;
-  initialise(context);
+inline void embreeIntersect8(const int* valid, RTCScene scene, RTCRayHit8& q, FilterContext context) {
   rtcIntersect8(valid, scene, &context, &q);
 }
-inline void embreeOccluded1(RTCScene scene, RTCRay& q, CrossedSurfaces* crossed) {
-  OcclusionContext context(crossed);
-  rtcOccluded1(scene, &context, &q);
-}
-inline void embreeOccluded8(const int* valid, RTCScene scene, RTCRay8& q, CrossedSurfaces* crossed) {
-  OcclusionContext context(crossed);
+inline void embreeOccluded1(RTCScene scene, RTCRay& q, FilterContext context) { rtcOccluded1(scene, &context, &q); }
+inline void embreeOccluded8(const int* valid, RTCScene scene, RTCRay8& q, FilterContext context) {
   rtcOccluded8(valid, scene, &context, &q);
 }
 #endif

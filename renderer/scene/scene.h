@@ -95,6 +95,7 @@ class Scene : private HitFilter {
  private:
   bool passThrough(uint32_t mesh, uint32_t triangle, float u, float v, bool backFace, uint32_t salt) const override;
   float passing(uint32_t mesh, uint32_t triangle, float u, float v, bool backFace, uint32_t salt) const override;
+  bool mayBePane(uint32_t mesh) const override { return material(data_.meshes[mesh]).mayBePane(); }
   void separateUnfit();
   void placeMeshes();
   void placeGroups(const std::vector<uint32_t>& shared, const std::vector<std::vector<size_t>>& placements);

@@ -6,18 +6,21 @@
 namespace braid {
 
 struct VisibilityBatch::Panes {
-  explicit Panes(const TransportContext& c) : context(c) {}
+  explicit Panes(const TransportContext& c) : context(c), blends(c.scene.traits().has(kTraitAlphaBlend)) {}
 
   enum class Crossing { Blocked, GoesOn, Arrived };
   Crossing cross(size_t ray, const RayHit& found);
+  void intersect(int count);
 
   const TransportContext& context;
+  const bool blends;
   std::array<RayQuery, kBatch> query;
   std::array<float, kBatch> index;  // refractive index around the ray
   std::array<Spectrum, kBatch> transmittance;
   std::array<int, kBatch> active;  // rays that have not arrived
   RayBatch rays;                   // in the order of `active`, like their hits
   std::array<RayHit, kBatch> hits;
+  std::array<float, kBatch> passing;  // where something blends: what is left of these before their hits
 };
 
 VisibilityBatch::VisibilityBatch(const TransportContext& context) : scene_(context.scene) {
@@ -50,13 +53,14 @@ void VisibilityBatch::trace(int count) {
   }
   int active = count;
   for (int crossed = 0; active > 0; ++crossed) {
-    scene_.accel().intersect(p.rays, active, p.hits.data());
+    p.intersect(active);
     int next = 0;
     for (int a = 0; a < active; ++a) {
       const RayHit& found = p.hits[static_cast<size_t>(a)];
-      if (!(found.t < kInfinity)) continue;
       const int i = p.active[static_cast<size_t>(a)];
       const auto k = static_cast<size_t>(i);
+      if (p.blends) p.transmittance[k] *= p.passing[static_cast<size_t>(a)];
+      if (!(found.t < kInfinity)) continue;
       const Panes::Crossing crossing = crossed + 1 < kMostPanes ? p.cross(k, found) : Panes::Crossing::Blocked;
       hidden_[k] = crossing == Panes::Crossing::Blocked;
       if (crossing != Panes::Crossing::GoesOn) continue;
@@ -65,6 +69,11 @@ void VisibilityBatch::trace(int count) {
     }
     active = next;
   }
+}
+
+void VisibilityBatch::Panes::intersect(int count) {
+  if (blends) return context.scene.accel().intersect(rays, count, hits.data(), passing.data());
+  context.scene.accel().intersect(rays, count, hits.data());
 }
 
 // Takes a ray to the far side of the surface that it hit, if that lets it through.
@@ -77,7 +86,8 @@ VisibilityBatch::Panes::Crossing VisibilityBatch::Panes::cross(size_t ray, const
   Hit hit;
   makeHit(scene, found, direction, hit);
   const Bsdf bsdf(surfaceAt(scene, hit, material.lobes, index[ray]), hit.frame.toLocal(hit.wo));
-  transmittance[ray] *= bsdf.straightTransmittance();
+  const float cover = blends ? scene.alpha(scene.mesh(found.mesh), found.triangle, found.u, found.v) : 1;
+  transmittance[ray] *= 1 - cover + cover * bsdf.straightTransmittance();
   if (isBlack(transmittance[ray])) return Crossing::Blocked;
   const Vec3 origin = offsetOrigin(hit, direction);
   q.salt &= ~kCameraRay;  // as that of a path that has passed a pane

@@ -90,6 +90,41 @@ TEST_CASE("A ray takes the share of every veil between its ends, also of two in 
   }
 }
 
+TEST_CASE("Veils before, between and behind panes take their share, and so does what a veil covers as a pane") {
+  SceneData data = emptyScene();
+  data.materials = {veil(0.25f), pane({0.5f, 1, 1}), pane(Spectrum(1)), diffuseMaterial(Spectrum(0.5f))};
+  data.materials[2].alphaMode = AlphaMode::Blend;
+  data.materials[2].alpha = 0.3f;
+  addVeil(data, 1, 0);
+  addVeil(data, 2, 1);
+  addVeil(data, 3, 0);
+  addVeil(data, 3, 0);
+  addVeil(data, 4, 2);
+  addVeil(data, 5, 0);
+  addVeil(data, 6, 3, 1);  // a wall over a quarter, and a veil behind it
+  addVeil(data, 7, 0);
+  const Scene scene(std::move(data));
+  CHECK(scene.traits().has(kTraitPanes));
+  const Vec3 up(0, 0, 1), clear(0.5f, 0.3f, 0), walled(-0.5f, -0.6f, 0);
+  const float kPane = 0.5f * 0.96f, kVeiledPane = 0.7f + 0.3f * 0.96f,
+              kToWall = std::pow(0.75f, 4.0f) * kPane * kVeiledPane;
+  for (uint32_t salt = 0; salt < 200; salt += 2) {
+    const std::vector<Seen> seen = see(scene, {{clear, up, kInfinity, salt},
+                                               {clear + up * 9.0f, -up, kInfinity, salt},
+                                               {clear, up * 3.5f, 1, salt},
+                                               {clear, up, 2.5f, salt},
+                                               {walled, up, 5.5f, salt},
+                                               {walled, up, kInfinity, salt}});
+    const std::array<float, 6> passing{0.75f * kToWall, 0.75f * kToWall, std::pow(0.75f, 3.0f) * kPane,
+                                       0.75f * kPane,   kToWall,         0};
+    for (size_t k = 0; k < passing.size(); ++k) {
+      CAPTURE(k);
+      CHECK(seen[k].hidden == (k == 5));
+      if (k != 5) CHECK(seen[k].passing == doctest::Approx(passing[k]).epsilon(1e-5));
+    }
+  }
+}
+
 TEST_CASE("A lone ray and rays in packets take the same share, to the bit") {
   SceneData data = emptyScene();
   for (int k = 0; k < 30; ++k) {
