@@ -19,7 +19,8 @@ using QueryContext = RTCIntersectContext;
 inline void initialise(QueryContext& context) { rtcInitIntersectContext(&context); }
 #endif
 
-// What the filters of a query find: `crossed`, where they collect, has an entry a lane.
+// What the filters of every query find: `crossed`, where they collect, has an entry a lane.
+// TRAP: they read it from whatever context a query has, so that no query may have another.
 struct FilterContext : QueryContext {
   explicit FilterContext(CrossedSurfaces* surfaces) : crossed(surfaces) { initialise(*this); }
   CrossedSurfaces* crossed;

@@ -10,6 +10,7 @@
 #include "renderer/core/hash.h"
 #include "renderer/core/parallel.h"
 #include "renderer/core/stopwatch.h"
+#include "renderer/scene/embree_queries.h"
 
 namespace braid {
 
@@ -33,8 +34,6 @@ uint64_t peakMemory() {
 
 // Traces one recorded ray by Embree alone.
 void traceRaw(RTCScene scene, const RecordedRay& r) {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
   RTCRayHit query;
   query.ray.org_x = r.origin.x;
   query.ray.org_y = r.origin.y;
@@ -51,9 +50,9 @@ void traceRaw(RTCScene scene, const RecordedRay& r) {
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   if (r.shadow)
-    rtcOccluded1(scene, &context, &query.ray);
+    embreeOccluded1(scene, query.ray, FilterContext(nullptr));
   else
-    rtcIntersect1(scene, &context, &query);
+    embreeIntersect1(scene, query, FilterContext(nullptr));
 }
 
 // Traces the recorded rays as the renderer does: in packets of neighbours of one kind.
