@@ -141,7 +141,8 @@ class Accel {
   // they meet another one than single rays do, and then paths from the camera and from lights see different scenes.
   void intersect(RayBatch& rays, int count, RayHit* hits) const;
   // The same where what is covered in part, but for panes, lets its share of the light pass instead of some of the
-  // rays: passing[i] is the share of ray i that is left at its hit, 0 where the hit is one thing too many.
+  // rays: passing[i] is the share of ray i that is left at its hit. After CrossedSurfaces::kMost such surfaces the next
+  // one is the hit.
   void intersect(RayBatch& rays, int count, RayHit* hits, float* passing) const;
   // results[i] = whether anything lies in (0, tmax) of ray i. Consumes the rays.
   void occluded(ShadowBatch& rays, int count, bool* results) const;

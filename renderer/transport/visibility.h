@@ -2,7 +2,7 @@
 // What of a light gets through to a point: nothing past a surface, unless that is a pane, thin, smooth and clear, which
 // light crosses straight on, or covers its place in part (alpha-blended). A ray is multiplied by the exact
 // transmittance of all that it crosses; since the path is straight, nothing is estimated, and lights without size are
-// found behind panes, too. In scenes with panes, alpha-blended surfaces let some of the rays pass instead.
+// found behind panes, too.
 //
 // Paths that are walked pass panes likewise (Bsdf::straightTransmittance() is the transmission of their BSDF, taken out
 // of scattering), so that all ways to sample a path agree on which surfaces are its vertices.
