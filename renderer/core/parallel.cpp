@@ -66,29 +66,62 @@ void withThreads(int threads, const std::function<void()>& task) {
 
 namespace {
 
-// Looks at a flag every few milliseconds, on a thread of its own, and cancels a context once it is set.
+// Looks at flags every few milliseconds, on a thread of its own, and cancels the contexts of those that are set. There
+// is one until the process ends: a thread is no small thing to start (startThreads()).
 class CancelWatch {
  public:
-  CancelWatch(const std::atomic<bool>& cancel, tbb::task_group_context& context)
-      : thread_([this, &cancel, &context] {
-          std::unique_lock lock(mutex_);
-          while (!wake_.wait_for(lock, std::chrono::milliseconds(5), [this] { return over_; }))
-            if (cancel.load()) context.cancel_group_execution();
-        }) {}
-  ~CancelWatch() {
-    {
-      const std::lock_guard lock(mutex_);
-      over_ = true;
-    }
+  static CancelWatch& shared() {
+    static CancelWatch& watch = *new CancelWatch;
+    return watch;
+  }
+
+  void add(const std::atomic<bool>& cancel, tbb::task_group_context& context) {
+    const std::lock_guard lock(mutex_);
+    watched_.push_back({&cancel, &context});
     wake_.notify_one();
-    thread_.join();
+  }
+
+  void remove(const tbb::task_group_context& context) {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(watched_, [&](const Watched& w) { return w.context == &context; });
   }
 
  private:
+  struct Watched {
+    const std::atomic<bool>* cancel;
+    tbb::task_group_context* context;
+  };
+
+  CancelWatch() {
+    std::thread([this] { watch(); }).detach();
+  }
+
+  [[noreturn]] void watch() {
+    std::unique_lock lock(mutex_);
+    while (true) {
+      wake_.wait(lock, [this] { return !watched_.empty(); });
+      for (const Watched& w : watched_)
+        if (w.cancel->load()) w.context->cancel_group_execution();
+      lock.unlock();
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      lock.lock();
+    }
+  }
+
   std::mutex mutex_;
   std::condition_variable wake_;
-  bool over_ = false;
-  std::thread thread_;
+  std::vector<Watched> watched_;
+};
+
+// A context for as long as it is watched.
+class Watching {
+ public:
+  explicit Watching(const std::atomic<bool>& cancel) { CancelWatch::shared().add(cancel, context); }
+  ~Watching() { CancelWatch::shared().remove(context); }
+  Watching(const Watching&) = delete;
+  Watching& operator=(const Watching&) = delete;
+
+  tbb::task_group_context context;
 };
 
 }  // namespace
@@ -96,10 +129,14 @@ class CancelWatch {
 void cancellable(const std::atomic<bool>* cancel, const std::function<void()>& task) {
   if (!cancel) return task();
   // The context of loops inside of a task is that of the task.
-  tbb::task_group_context context;
-  const CancelWatch watch(*cancel, context);
+  Watching watching(*cancel);
   tbb::parallel_for(
-      0, 1, [&](int) { task(); }, context);
+      0, 1, [&](int) { task(); }, watching.context);
+}
+
+void startThreads() {
+  CancelWatch::shared();
+  parallelFor(4 * static_cast<size_t>(machineThreads()), [](size_t) {});
 }
 
 int machineThreads() { return tbb::info::default_concurrency(); }

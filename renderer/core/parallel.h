@@ -17,6 +17,9 @@ constexpr size_t kPixelChunk = 4096;
 // Calls task(body, i) for all i < count. Every loop below goes through it: the thread library is known to one file.
 void parallelTasks(size_t count, const void* body, void (*task)(const void* body, size_t index));
 
+// Starts the threads, which otherwise start with the first loop: they would wait for a module that is being opened.
+void startThreads();
+
 // Calls body(i) for all i < count, in any order on any thread; the first exception that is thrown ends it.
 template <class Body>
 void parallelFor(size_t count, const Body& body) {

@@ -13,7 +13,6 @@
 #include "renderer/core/error.h"
 #include "renderer/core/stopwatch.h"
 #include "renderer/film/files/output_file.h"
-#include "renderer/images/open_images.h"
 #include "tools/options/cli.h"
 #include "tools/options/file_uses.h"
 #include "tools/options/syntax/help.h"
@@ -22,6 +21,7 @@
 #include "tools/preview/preview_feed.h"
 #include "tools/preview/preview_server.h"
 #include "tools/images/exr_metadata.h"
+#include "tools/prepare/open_modules.h"
 #include "tools/prepare/prepared_render.h"
 #include "tools/publish/publisher.h"
 #include "tools/publish/tev_client.h"
@@ -143,10 +143,10 @@ void checkOutputs(const PreviewOptions& o) {
 }
 
 // The passes, until a limit, the page or a signal ends them.
-RunReport showPasses(const PreviewOptions& o, Session& session, Audience& audience, OpeningImages& images,
+RunReport showPasses(const PreviewOptions& o, Session& session, Audience& audience, OpeningModules& modules,
                      const std::atomic<bool>& stop, const std::atomic<bool>& interrupted) {
   const bool writesImages = !o.image.files().empty();
-  if (writesImages) images.check();
+  if (writesImages) modules.checkImages();
   const bool knowsErrors = session.plan().unreachable.empty();
   PreviewFeed feed(
       o.image.combine, session, session.plan().settings.threads,
@@ -160,7 +160,7 @@ RunReport showPasses(const PreviewOptions& o, Session& session, Audience& audien
   const RunReport result = session.advance(
       [&](const Progress& p) {
         feed.round(p);
-        if (writesImages) images.check();
+        if (writesImages) modules.checkImages();
         audience.board().progress(p);
         audience.passWarningsOn();
         line.update(p);
@@ -181,7 +181,7 @@ int runPreview(PreviewOptions o) {
   // inherit this.
   setpriority(PRIO_PROCESS, 0, 5);
 
-  OpeningImages images;
+  OpeningModules modules;
   const PreparedRender render = prepareRender(o.scene, settings, o.image.combine, {settings.spp});
   const PlannedRender& planned = render.planned;
   requireRunnable(planned.combinePlan, o.image.combine.methods);
@@ -192,7 +192,7 @@ int runPreview(PreviewOptions o) {
   audience.board().setPlan(planned.text(), o.image.combine.text(), static_cast<int>(plan.integrators.size()));
   if (!plan.unreachable.empty()) audience.warn(plan.unreachable);
   audience.board().setPhase(PreviewPhase::Rendering);
-  const RunReport result = showPasses(o, *session, audience, images, stop, interrupted);
+  const RunReport result = showPasses(o, *session, audience, modules, stop, interrupted);
 
   const bool cancelled = result.reason == StopReason::Cancelled && !stop;
   const WrittenImage written = save(o, *session, result, audience, cancelled);

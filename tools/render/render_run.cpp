@@ -137,7 +137,7 @@ int renderAndWrite(Session& session, const Run& run, std::optional<CoarseRender>
   const RenderOptions& o = run.o;
   JsonLog& json = run.around.json;
   const bool writesImages = !o.image.files().empty();
-  if (writesImages) run.around.images.check();
+  if (writesImages) run.around.modules.checkImages();
   const Settings& settings = session.plan().settings;
   ProgressLine line(o.scene.quiet);
   Publisher publisher({run.around.viewer.with(run.image()), o.checkpoint, o.saveEvery, o.error,
@@ -151,7 +151,7 @@ int renderAndWrite(Session& session, const Run& run, std::optional<CoarseRender>
         late.over(p.round, json);
         if (late.dropped()) return false;
         coarse.reset();
-        if (writesImages) run.around.images.check();
+        if (writesImages) run.around.modules.checkImages();
         std::vector<Publication> news = publisher.round(p);
         run.around.viewer.addFailure(news);
         sayNews(news, o, json);

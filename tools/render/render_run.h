@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "renderer/images/open_images.h"
 #include "tools/render/render_options.h"
 #include "tools/options/open_scene.h"
+#include "tools/prepare/open_modules.h"
 #include "tools/publish/publisher.h"
 #include "tools/run/interrupt.h"
 #include "tools/run/progress_line.h"
@@ -39,7 +39,7 @@ struct Surroundings {
   Viewer viewer;
   JsonLog json;
   const std::atomic<bool>& interrupted;
-  OpeningImages images;
+  OpeningModules modules;
 };
 
 struct ImageRun {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include <dlfcn.h>
@@ -96,23 +97,42 @@ Rgb<float> OidnDevice::denoise(const Rgb<float>& colour, const Rgb<float>* albed
   return out;
 }
 
-const OidnApi* loadOidn(const std::string& file, std::string& reason) {
-  static std::mutex mutex;
-  static std::map<std::string, OidnApi> loaded;
-  const std::lock_guard lock(mutex);
-  if (const auto found = loaded.find(file); found != loaded.end()) return &found->second;
+namespace {
+
+struct Search {
+  std::optional<OidnApi> api;
+  std::string reason;
+};
+
+Search search(const std::string& file) {
   std::vector<std::string> names{file};
   if (file.empty())
     names = {"libOpenImageDenoise.so.2", "libOpenImageDenoise.so.1", "libOpenImageDenoise.so.0",
              "libOpenImageDenoise.so"};
-  reason = "Open Image Denoise is not installed: no " + names[0] + " that the loader finds";
+  Search result;
+  result.reason = "Open Image Denoise is not installed: no " + names[0] + " that the loader finds";
   for (const std::string& name : names) {
     void* library = dlopen(name.c_str(), RTLD_NOW | RTLD_LOCAL);
     OidnApi api;
-    if (library && findAll(library, api)) return &(loaded[file] = api);
-    if (library) reason = name + " lacks functions of Open Image Denoise 1 or 2";
+    if (library && findAll(library, api)) {
+      result.api = api;
+      return result;
+    }
+    if (library) result.reason = name + " lacks functions of Open Image Denoise 1 or 2";
   }
-  return nullptr;
+  return result;
+}
+
+}  // namespace
+
+const OidnApi* loadOidn(const std::string& file, std::string& reason) {
+  static std::mutex mutex;
+  static std::map<std::string, Search> searches;
+  const std::lock_guard lock(mutex);
+  const auto found = searches.find(file);
+  const Search& of = found != searches.end() ? found->second : searches.emplace(file, search(file)).first->second;
+  reason = of.reason;
+  return of.api ? &*of.api : nullptr;
 }
 
 }  // namespace braid

@@ -31,7 +31,7 @@ inline constexpr int kOidnCpuDevice = 1;
 inline constexpr int kOidnFloat3 = 3;
 
 // The functions of the library `file`, or of the installed one when empty, versions 1 and 2. Null when there is none;
-// `reason` says why then. Loaded once a file and never unloaded.
+// `reason` says why then. Looked for once a file and never unloaded.
 const OidnApi* loadOidn(const std::string& file, std::string& reason);
 
 // A device of the library, released at the end of the scope.
