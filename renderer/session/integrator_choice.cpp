@@ -294,6 +294,7 @@ void planIntegrators(const Scene& scene, const CameraData& camera, const std::ve
       std::find(settings.integrators.begin(), settings.integrators.end(), "auto") != settings.integrators.end();
   if (automatic || mayMissLight(scene.traits())) {
     context.emplace(scene, settings.lightStrategy);
+    if (plan.lightKinds) context->lights.setKinds(*plan.lightKinds);
     reach = measureLightReach(*context, plan.camera, settings.width, settings.height);
   }
   const bool shadowAlpha = wantsShadowAlpha(scene, settings);

@@ -2,12 +2,14 @@
 // What will run and what is left out, with a reason for each: a pure function of the scene's traits and the settings.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "renderer/scene/camera.h"
 #include "renderer/scene/scene.h"
 #include "renderer/session/settings.h"
+#include "renderer/transport/lights/light_sampler.h"
 
 namespace braid {
 
@@ -28,7 +30,8 @@ struct Plan {
   Settings settings;
   Camera camera;
   PixelWindow window;
-  KeptBuffers kept;  // settings.keep where integrators provide it; more with settings.full
+  KeptBuffers kept;                      // settings.keep where integrators provide it; more with settings.full
+  std::optional<LightKinds> lightKinds;  // where there are several
   std::vector<PlannedIntegrator> integrators;
   std::vector<PlanLine> lines;
   // What of the light in view no integrator of the plan can find, and the mend; empty where they find it. The estimated

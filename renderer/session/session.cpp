@@ -208,6 +208,7 @@ class Session::Loop {
 
 Session::Session(const Scene& scene, Plan plan)
     : scene_(scene), plan_(std::move(plan)), context_(scene, plan_.settings.lightStrategy) {
+  if (plan_.lightKinds) context_.lights.setKinds(*plan_.lightKinds);
   if (plan_.integrators.empty()) throw Error(ExitCode::Usage, "no integrator to run: name one with --integrator");
   film_ = emptyFilm(plan_, plan_.window.width(), plan_.window.height());
   film_.identity.isa = scene.accel().isa();

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "renderer/transport/glance.h"
 #include "renderer/transport/shadow_ray.h"
 #include "renderer/transport/subpath.h"
 
@@ -17,21 +18,14 @@ constexpr int kLitSegments = 12;
 // From so much weight on, a share this large is no accident of where the first paths went.
 constexpr double kEnoughSeen = 128, kEnoughLit = 0.1;
 
-// Evenly spread over the frame from the first points on: additive recurrence by the powers of the plastic number
-// (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences").
-Vec2 framePoint(int i) {
-  const double x = 0.5 + 0.7548776662466927 * i, y = 0.5 + 0.5698402909980532 * i;
-  return {static_cast<float>(x - std::floor(x)), static_cast<float>(y - std::floor(y))};
-}
-
 float emittedTowards(const Scene& scene, const Hit& hit) {
   return hit.material->emissive() ? average(emissionAt(scene, hit)) : 0;
 }
 
 // What the paths of one batch see.
-class Glance {
+class LitGlance {
  public:
-  Glance(const TransportContext& context, const PassSampler& sampler)
+  LitGlance(const TransportContext& context, const PassSampler& sampler)
       : context_(context), sampler_(sampler), rays_(context) {}
 
   Onward onHit(int index, const SubpathVertex& vertex) {
@@ -118,14 +112,8 @@ LitShare measureLitShare(const TransportContext& context, const Camera& camera, 
   LitShare lit;
   for (int first = 0; first < kCameraPaths; first += kBatch) {
     batch.clear();
-    for (int i = first; i < first + kBatch; ++i) {
-      const uint64_t key = sampler.itemKey(static_cast<uint64_t>(i));
-      const float time = context.scene.timeAt(sampler.block(key, 0).u[slot::kTime]);
-      Camera::CameraRay ray = CameraAt(camera, time)->ray(framePoint(i) * frame);
-      ray.time = time;
-      batch.startCamera(key, ray, media, 1, 1, camera.orthographic());
-    }
-    Glance glance(context, sampler);
+    for (int i = first; i < first + kBatch; ++i) startGlance(context.scene, camera, frame, media, i, batch);
+    LitGlance glance(context, sampler);
     batch.run([&](int index, const SubpathState&, const SubpathVertex& v) { return glance.onHit(index, v); },
               [&](int index, const SubpathState& state) { glance.onMiss(index, state); });
     glance.addTo(lit, reference);

@@ -10,6 +10,8 @@ namespace braid {
 
 namespace {
 
+enum Kind : size_t { kFinite, kDirectional, kEnvironment };
+
 LightBounds boundsOf(const Scene& scene, const EmissiveTriangle& e) {
   const Scene::Sweep sweep = scene.sweepOf(e);
   LightBounds b;
@@ -90,7 +92,7 @@ float spotFalloff(const PunctualLight& light, float cosAngle) {
 
 bool hierarchyPays(size_t emissiveTriangles, size_t positionalLights) {
   const size_t finite = emissiveTriangles + positionalLights;
-  return finite > 8 || (finite > 1 && positionalLights > 0);
+  return finite > 2 || (finite > 1 && positionalLights > 0);
 }
 
 LightSampler::LightSampler(const Scene& scene, LightStrategy strategy) : scene_(scene) {
@@ -123,8 +125,7 @@ LightSampler::LightSampler(const Scene& scene, LightStrategy strategy) : scene_(
   }
   directionalCumulative_ = cumulativeOf(irradiances);
 
-  // Categories: half by the irradiance they would give unoccluded, half evenly, so that no category starves where the
-  // others are hidden.
+  // Half evenly, so that no kind starves where the others are hidden.
   const double radius = static_cast<double>(scene.traits().radius);
   const double environmentIrradiance =
       scene.environment() ? static_cast<double>(kPi * average(scene.environment()->average())) : 0.0;
@@ -133,11 +134,8 @@ LightSampler::LightSampler(const Scene& scene, LightStrategy strategy) : scene_(
   const double total = share[0] + share[1] + share[2];
   const int active = (share[0] > 0) + (share[1] > 0) + (share[2] > 0);
   if (active == 0 || !(total > 0) || !std::isfinite(total)) return;
-  float* probability[3] = {&probabilityFinite_, &probabilityDirectional_, &probabilityEnvironment_};
-  for (int i = 0; i < 3; ++i) {
-    if (!(share[i] > 0)) continue;
-    *probability[i] = active == 1 ? 1.0f : static_cast<float>(0.5 * share[i] / total + 0.5 / active);
-  }
+  for (size_t i = 0; i < 3; ++i)
+    if (share[i] > 0) kinds_[i] = active == 1 ? 1.0f : static_cast<float>(0.5 * share[i] / total + 0.5 / active);
 }
 
 bool LightSampler::sampleEmitter(const EmissiveTriangle& e, const Receiver& at, Vec2 u, LightSample& out) const {
@@ -183,13 +181,13 @@ bool LightSampler::sampleFinite(const Receiver& at, size_t light, float probabil
   EmissiveTriangle moved;
   const bool ok = light < emitters ? sampleEmitter(scene_.emitterAt(light, at.time, moved), at, u, out)
                                    : samplePunctual(scene_.lights()[positional_[light - emitters]], at, out);
-  out.pdfW *= probability * probabilityFinite_;
+  out.pdfW *= probability * kinds_[kFinite];
   return ok && out.pdfW > 0;
 }
 
 bool LightSampler::sampleInfinite(const Receiver& at, float uSelect, Vec2 u, LightSample& out) const {
-  if (uSelect < probabilityFinite_ + probabilityDirectional_) {
-    float select = std::clamp((uSelect - probabilityFinite_) / probabilityDirectional_, 0.0f, kOneMinusEpsilon),
+  if (uSelect < kinds_[kFinite] + kinds_[kDirectional]) {
+    float select = std::clamp((uSelect - kinds_[kFinite]) / kinds_[kDirectional], 0.0f, kOneMinusEpsilon),
           probability = 0;
     const size_t index = pickInterval(directionalCumulative_, select, probability);
     const PunctualLight& light = scene_.lights()[directional_[index]];
@@ -197,13 +195,13 @@ bool LightSampler::sampleInfinite(const Receiver& at, float uSelect, Vec2 u, Lig
     out.wi = -placeAt(light, at.time).direction;
     out.distance = kInfinity;
     out.radiance = light.intensity;
-    out.pdfW = probability * probabilityDirectional_;
+    out.pdfW = probability * kinds_[kDirectional];
     out.delta = true;
     return out.pdfW > 0;
   }
-  if (probabilityEnvironment_ == 0) return false;
-  out.pdfW = scene_.environment()->sample(at.twoSided ? Vec3(0) : at.normal, u, out.wi, out.radiance) *
-             probabilityEnvironment_;
+  if (kinds_[kEnvironment] == 0) return false;
+  out.pdfW =
+      scene_.environment()->sample(at.twoSided ? Vec3(0) : at.normal, u, out.wi, out.radiance) * kinds_[kEnvironment];
   if (!(out.pdfW > 0) || !std::isfinite(out.pdfW)) return false;
   out.light = environmentLight();
   out.distance = kInfinity;
@@ -212,8 +210,8 @@ bool LightSampler::sampleInfinite(const Receiver& at, float uSelect, Vec2 u, Lig
 }
 
 bool LightSampler::sample(const Receiver& at, float uSelect, Vec2 u, LightSample& out) const {
-  if (!(uSelect < probabilityFinite_)) return sampleInfinite(at, uSelect, u, out);
-  float select = std::min(uSelect / probabilityFinite_, kOneMinusEpsilon), probability = 0;
+  if (!(uSelect < kinds_[kFinite])) return sampleInfinite(at, uSelect, u, out);
+  float select = std::min(uSelect / kinds_[kFinite], kOneMinusEpsilon), probability = 0;
   if (!hierarchy_) {
     const size_t light = pickInterval(cumulative_, select, probability);
     return sampleFinite(at, light, probability, u, out);
@@ -224,8 +222,8 @@ bool LightSampler::sample(const Receiver& at, float uSelect, Vec2 u, LightSample
 }
 
 bool LightSampler::sample(const Receiver& at, const LightQuery& picked, Vec2 u, LightSample& out) const {
-  return picked.u < probabilityFinite_ ? sampleFinite(at, picked.light, picked.probability, u, out)
-                                       : sampleInfinite(at, picked.u, u, out);
+  return picked.u < kinds_[kFinite] ? sampleFinite(at, picked.light, picked.probability, u, out)
+                                    : sampleInfinite(at, picked.u, u, out);
 }
 
 void LightSampler::pick(std::span<LightQuery> queries) const {
@@ -235,14 +233,14 @@ void LightSampler::pick(std::span<LightQuery> queries) const {
   std::array<LightQuery, LightTree::kMostQueries> finite;
   size_t count = 0;
   for (const LightQuery& query : queries)
-    if (query.u < probabilityFinite_) {
+    if (query.u < kinds_[kFinite]) {
       finite[count] = query;
-      finite[count++].u = std::min(query.u / probabilityFinite_, kOneMinusEpsilon);
+      finite[count++].u = std::min(query.u / kinds_[kFinite], kOneMinusEpsilon);
     }
   tree_.sample({finite.data(), count});
   count = 0;
   for (LightQuery& query : queries)
-    if (query.u < probabilityFinite_) {
+    if (query.u < kinds_[kFinite]) {
       query.light = finite[count].light;
       query.probability = finite[count++].probability;
     }
@@ -259,29 +257,29 @@ float LightSampler::areaOf(size_t emitter, float time) const {
 }
 
 float LightSampler::pdfEmitter(const Receiver& at, size_t index, float distance, float cosLight) const {
-  if (probabilityFinite_ == 0) return 0;
+  if (kinds_[kFinite] == 0) return 0;
   const float pdf = sqr(distance) / (cosLight * areaOf(index, at.time));
-  const float choice = finiteProbability(at, index) * probabilityFinite_;
+  const float choice = finiteProbability(at, index) * kinds_[kFinite];
   const float result = choice * pdf;
   return std::isfinite(result) ? result : 0.0f;
 }
 
 float LightSampler::pdfDirect(uint32_t light, const Receiver& at, const Vec3& toLight) const {
   if (light < finite_) {
-    if (probabilityFinite_ == 0) return 0;
-    const float choice = finiteProbability(at, light) * probabilityFinite_;
+    if (kinds_[kFinite] == 0) return 0;
+    const float choice = finiteProbability(at, light) * kinds_[kFinite];
     return light < firstPositional() ? choice / areaOf(light, at.time) : choice;
   }
   if (light < environmentLight()) {
     const size_t i = light - finite_;
-    return (directionalCumulative_[i + 1] - directionalCumulative_[i]) * probabilityDirectional_;
+    return (directionalCumulative_[i + 1] - directionalCumulative_[i]) * kinds_[kDirectional];
   }
   return pdfEnvironment(at, toLight);
 }
 
 float LightSampler::pdfEnvironment(const Receiver& at, const Vec3& direction) const {
-  if (probabilityEnvironment_ == 0) return 0;
-  const float pdf = scene_.environment()->pdfW(at.twoSided ? Vec3(0) : at.normal, direction) * probabilityEnvironment_;
+  if (kinds_[kEnvironment] == 0) return 0;
+  const float pdf = scene_.environment()->pdfW(at.twoSided ? Vec3(0) : at.normal, direction) * kinds_[kEnvironment];
   return std::isfinite(pdf) ? pdf : 0.0f;
 }
 

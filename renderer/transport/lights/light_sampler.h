@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <span>
 #include <vector>
 
@@ -34,14 +35,23 @@ struct Receiver {
 // How finite lights are chosen.
 enum class LightStrategy { Automatic, Power, Hierarchy };
 
-// Whether a light hierarchy is worth its cost: not for up to 8 emissive triangles (a few area lights), where choosing
-// by power is as good or better; yes as soon as distances and cones of several lights differ from point to point.
+// Whether a light hierarchy is worth its cost: not for up to two emissive triangles, which are the halves of one lamp
+// as a rule; yes as soon as distances and cones of several lights differ from point to point.
 bool hierarchyPays(size_t emissiveTriangles, size_t positionalLights);
+
+// Of light samples those that choose a finite light, a directional one and the environment. They add up to 1, or are
+// all 0 without lights.
+using LightKinds = std::array<float, 3>;
 
 class LightSampler {
  public:
   // Automatic: see hierarchyPays().
   LightSampler(const Scene& scene, LightStrategy strategy);
+
+  // By default half by the irradiance that each kind would give unoccluded and half evenly among those that are there;
+  // a kind that is not has 0. Set before anything is rendered (light_kinds.h).
+  const LightKinds& kinds() const { return kinds_; }
+  void setKinds(const LightKinds& kinds) { kinds_ = kinds; }
 
   // Samples a light for a point. False: no light can contribute.
   bool sample(const Receiver& at, float uSelect, Vec2 u, LightSample& out) const;
@@ -94,7 +104,7 @@ class LightSampler {
   std::vector<uint32_t> positional_;  // punctual lights with a position
   std::vector<uint32_t> directional_;
   std::vector<float> directionalCumulative_;
-  float probabilityFinite_ = 0, probabilityDirectional_ = 0, probabilityEnvironment_ = 0;
+  LightKinds kinds_{};
 };
 
 // What the range of a light leaves of it at a distance, in [0, 1]: the window of KHR_lights_punctual, which ends

@@ -65,13 +65,20 @@ struct RenderFiles {
   fs::path state, image, log;
 };
 
-// Kills a render so many seconds after it has begun to trace, or else after it was started.
-void killRender(const RenderFiles& files, double saveEvery, bool tracing, double delay) {
+enum class After { Start, Plan, FirstImage };
+
+// Kills a render so many seconds after one of these.
+void killRender(const RenderFiles& files, double saveEvery, After after, double delay) {
   fs::remove(files.log);
+  const auto lastImage = [&] {
+    return fs::exists(files.image) ? fs::last_write_time(files.image) : fs::file_time_type::min();
+  };
+  const fs::file_time_type before = lastImage();
   Process process({"--size", "24x16", "--integrator", "pt,crn", "--reproducible", "--threads", "2", "--time", "60",
                    "--save-every", std::to_string(saveEvery), "--checkpoint", files.state.string(), "--resume", "-o",
                    files.image.string(), "--log-json", files.log.string()});
-  if (tracing) REQUIRE(waitUntil([&] { return contains(readText(files.log), "\"plan\""); }));
+  if (after == After::Plan) REQUIRE(waitUntil([&] { return contains(readText(files.log), "\"plan\""); }));
+  if (after == After::FirstImage) REQUIRE(waitUntil([&] { return lastImage() != before; }));
   sleepFor(delay);
   process.signal(SIGKILL);
   CHECK(process.wait() == -SIGKILL);
@@ -90,8 +97,11 @@ TEST_CASE("Killed at any moment, fifty times, a render leaves whole files and lo
   int resumed = 0, images = 0, leftOver = 0;
   for (int kill = 0; kill < 50; ++kill) {
     const double secondsBefore = rounds > 0 ? readStateHeader(state).seconds : 0;
-    // Most kills fall into the pass loop, some into starting up.
-    killRender({state, image, log}, kSaveEvery, kill % 5 != 0, delay(random));
+    // Most kills fall between saves or into one, some into starting up, and into the first passes while the image
+    // codecs open, which take longer.
+    constexpr After kMoments[] = {After::Start, After::Plan, After::FirstImage, After::FirstImage, After::FirstImage};
+    const After after = kMoments[kill % 5];
+    killRender({state, image, log}, kSaveEvery, after, (after == After::Plan ? 4 : 1) * delay(random));
 
     for (const std::string& name : filesIn(folder.path)) leftOver += contains(name, ".tmp-");
     if (fs::exists(image)) {
