@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "renderer/transport/glance.h"
-#include "renderer/transport/mis.h"
 #include "renderer/transport/shadow_ray.h"
 
 namespace braid {
@@ -20,11 +19,14 @@ constexpr int kCellsAcross = 16;  // parts of the frame that have a brightness o
 constexpr double kEven = 0.2;
 constexpr double kDark = 0.1;  // of the frame's brightness count in every part, as relL2 does
 constexpr double kMost = 16;   // times the brightness: single finds of more would decide alone
+constexpr int kSteps = 32;
+constexpr double kLeast = 1e-6;  // of a share, so that it can grow again
 
-// What one light sample brings to its pixel.
+// What one light sample brings to its pixel, where it is the only kind and has no weight.
 struct Find {
   size_t cell = 0, kind = 0;
   double value = 0;
+  double density = 0, bsdfDensity = 0;  // per steradian; of a light without size 1 and 0
 };
 
 // The finds of a batch of camera paths.
@@ -57,15 +59,15 @@ class KindsGlance {
     if (!context_.lights.sample(vertex.receiver(), select, {u.u[slot::kLightU], u.u[slot::kLightV]}, light)) return;
     const VertexValue toLight = evaluateVertex(context_, vertex, Transport::Radiance, light.wi);
     const float density = light.pdfW / share;
-    const float weight = light.delta ? 1 : powerHeuristic(density, toLight.pdfW);
-    const double value =
-        static_cast<double>(average(vertex.throughput * toLight.f * light.radiance) * weight / density);
+    const double value = static_cast<double>(average(vertex.throughput * toLight.f * light.radiance) / density);
     if (!(value > 0) || !std::isfinite(value)) return;
     if (waiting_.size() == kBatch) trace();
     const uint32_t salt = sampler_.salt(vertex.key, 0) & ~kCameraRay;
     rays_.set(static_cast<int>(waiting_.size()), shadowRay(vertex.hit, light.wi, light.distance, salt),
               mediumIndex(context_.scene, vertex.media));
-    waiting_.push_back({cellOf(framePoint(first_ + index)), kind, value});
+    const float bsdfDensity = light.delta ? 0 : toLight.pdfW;
+    waiting_.push_back({cellOf(framePoint(first_ + index)), kind, value, static_cast<double>(density),
+                        static_cast<double>(bsdfDensity)});
   }
 
   static size_t cellOf(Vec2 at) {
@@ -113,8 +115,8 @@ std::vector<Find> findLight(const TransportContext& context, const Camera& camer
   return all;
 }
 
-// Of each kind.
-std::array<double, 3> secondMoments(const std::vector<Find>& finds) {
+// Values relative to the brightness of their parts of the frame.
+void makeRelative(std::vector<Find>& finds) {
   constexpr size_t kCells = kCellsAcross * kCellsAcross;
   std::array<double, kCells> brightness{};
   double mean = 0;
@@ -122,12 +124,24 @@ std::array<double, 3> secondMoments(const std::vector<Find>& finds) {
     brightness[f.cell] += f.value * (static_cast<double>(kCells) / kCameraPaths);
     mean += f.value / kCameraPaths;
   }
-  std::array<double, 3> moments{};
-  for (const Find& f : finds) {
-    const double relative = std::min(f.value / (brightness[f.cell] + kDark * mean), kMost);
-    moments[f.kind] += relative * relative;
+  for (Find& f : finds) f.value = std::min(f.value / (brightness[f.cell] + kDark * mean), kMost);
+}
+
+// The shares that minimise ∫ value² / (share · density + bsdfDensity), summed over kinds: the derivatives by all shares
+// are equal there. The sum is convex, and every step takes each share nearer to that.
+std::array<double, 3> bestShares(const std::vector<Find>& finds, const LightKinds& kinds) {
+  std::array<double, 3> shares{};
+  for (size_t kind = 0; kind < shares.size(); ++kind) shares[kind] = static_cast<double>(kinds[kind]);
+  for (int step = 0; step < kSteps; ++step) {
+    std::array<double, 3> slopes{};
+    for (const Find& f : finds)
+      slopes[f.kind] += sqr(f.value * f.density / (shares[f.kind] * f.density + f.bsdfDensity));
+    double sum = 0;
+    for (size_t kind = 0; kind < shares.size(); ++kind) sum += shares[kind] *= std::sqrt(slopes[kind]);
+    if (!(sum > 0) || !std::isfinite(sum)) return {};
+    for (double& share : shares) share = std::max(share / sum, kLeast);
   }
-  return moments;
+  return shares;
 }
 
 }  // namespace
@@ -145,13 +159,14 @@ LightKinds measureLightKinds(const TransportContext& context, const Camera& came
   const auto present = std::count_if(kinds.begin(), kinds.end(), [](float share) { return share > 0; });
   if (present < 2) return kinds;
   const Vec2 frame(static_cast<float>(width), static_cast<float>(height));
-  const std::array<double, 3> moments = secondMoments(findLight(context, camera, frame));
-  const double sum = std::sqrt(moments[0]) + std::sqrt(moments[1]) + std::sqrt(moments[2]);
+  std::vector<Find> finds = findLight(context, camera, frame);
+  makeRelative(finds);
+  const std::array<double, 3> best = bestShares(finds, kinds);
+  const double sum = best[0] + best[1] + best[2];
   if (!(sum > 0)) return kinds;
   for (size_t kind = 0; kind < kinds.size(); ++kind)
     if (kinds[kind] > 0)
-      kinds[kind] =
-          static_cast<float>(kEven / static_cast<double>(present) + (1 - kEven) * std::sqrt(moments[kind]) / sum);
+      kinds[kind] = static_cast<float>(kEven / static_cast<double>(present) + (1 - kEven) * best[kind] / sum);
   return kinds;
 }
 

@@ -11,10 +11,9 @@ namespace braid {
 // How many kinds of lights there are.
 int lightKinds(const Scene& scene);
 
-// A fifth evenly, the rest in proportion to the root of the second moment of what a light sample of the kind brings,
-// relative to the brightness of that part of the frame: these shares have the least variance of all (Lagrange). Light
-// samples count by the weight that light samples have beside the BSDF's. A pure function of the scene, the camera and
-// the frame.
+// A fifth evenly, the rest by the shares that minimise the second moment of what light samples and directions of the
+// BSDF bring together, weighted by the balance heuristic, relative to the brightness of each part of the frame. A pure
+// function of the scene, the camera and the frame.
 LightKinds measureLightKinds(const TransportContext& context, const Camera& camera, int width, int height);
 
 }  // namespace braid
