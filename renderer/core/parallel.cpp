@@ -67,7 +67,7 @@ void withThreads(int threads, const std::function<void()>& task) {
 namespace {
 
 // Looks at flags every few milliseconds, on a thread of its own, and cancels the contexts of those that are set. There
-// is one until the process ends: a thread is no small thing to start (startThreads()).
+// is one until the process ends: threads that start would wait for a module that is being opened.
 class CancelWatch {
  public:
   static CancelWatch& shared() {

@@ -15,6 +15,15 @@ inline Vec2 framePoint(int i) {
   return {static_cast<float>(x - std::floor(x)), static_cast<float>(y - std::floor(y))};
 }
 
+// Walks of so many segments that are never ended before, and whose weights no one asks for.
+inline WalkSettings glanceSettings(int segments) {
+  WalkSettings settings;
+  settings.maxSegments = segments;
+  settings.roulette = {Roulette::kNever, 1};
+  settings.mis = false;
+  return settings;
+}
+
 // Begins walk i of a batch at framePoint(i) of a frame of that many pixels, at a time of its own.
 inline void startGlance(const Scene& scene, const Camera& camera, Vec2 frame, const MediaStack& media, int i,
                         SubpathBatch& batch) {

@@ -95,13 +95,9 @@ class KindsGlance {
 };
 
 std::vector<Find> findLight(const TransportContext& context, const Camera& camera, Vec2 frame) {
-  WalkSettings settings;
-  settings.maxSegments = kSegments;
-  settings.roulette = {Roulette::kNever, 1};
-  settings.mis = false;
   const PassSampler sampler(SamplerKind::Independent, kKindsSeed, 0, 0, 1);
   const MediaStack media = mediaOfCamera(context.scene, camera);
-  SubpathBatch batch(context, sampler, settings);
+  SubpathBatch batch(context, sampler, glanceSettings(kSegments));
   std::vector<Find> all;
   for (int first = 0; first < kCameraPaths; first += kBatch) {
     batch.clear();

@@ -101,14 +101,10 @@ class LitGlance {
 
 LitShare measureLitShare(const TransportContext& context, const Camera& camera, int width, int height,
                          double reference) {
-  WalkSettings settings;
-  settings.maxSegments = kLitSegments;
-  settings.roulette = {Roulette::kNever, 1};
-  settings.mis = false;
   const PassSampler sampler(SamplerKind::Independent, kLitSeed, 0, 0, 1);
   const MediaStack media = mediaOfCamera(context.scene, camera);
   const Vec2 frame(static_cast<float>(width), static_cast<float>(height));
-  SubpathBatch batch(context, sampler, settings);
+  SubpathBatch batch(context, sampler, glanceSettings(kLitSegments));
   LitShare lit;
   for (int first = 0; first < kCameraPaths; first += kBatch) {
     batch.clear();
