@@ -45,6 +45,41 @@ TEST_CASE("gltf errors: files that are no glTF at all") {
   CHECK(contains(errorOf([] { loadGltf("/dev/zero"); }), "not a regular file"));
 }
 
+TEST_CASE("gltf errors: files of other formats, and what helps") {
+  CHECK_BYTES("BLENDER-v304RENDH", "is a file of Blender; open it in Blender, say, and export glTF 2.0");
+  CHECK_BYTES("Kaydara FBX Binary  ", "is FBX; ");
+  CHECK_BYTES("# Wavefront\nv 0 0 0\n", "such as Wavefront OBJ; ");
+  CHECK_BYTES("mtllib a.mtl\n", "is Wavefront OBJ; ");
+  CHECK_BYTES("ply\nformat ascii 1.0\n", "is PLY; ");
+  CHECK_BYTES("#usda 1.0\n", "is USD; ");
+  CHECK_BYTES("<?xml version=\"1.0\"?><COLLADA/>", "COLLADA");
+  CHECK_BYTES(std::string("PK\x03\x04\0\0", 6), "is a ZIP archive (USDZ is one, too); unpack it");
+  CHECK_BYTES(std::string("\x1F\x8B\x08\0", 4), "is compressed (gzip)");
+  CHECK_BYTES(std::string("\x76\x2F\x31\x01\0", 5), "is an OpenEXR image; `braid info`, `combine`");
+  CHECK_BYTES(std::string("MM\0*", 4), "is a TIFF image");
+  CHECK_BYTES(std::string("MM\x20\0", 4), "is 3DS");
+  CHECK_BYTES("#?RADIANCE\n", "is an HDR image");
+  CHECK_BYTES("version https://git-lfs.github.com/spec/v1\noid sha256:0\n",
+              "is a pointer of Git LFS, not the file itself");
+  CHECK_BYTES("<!doctype HTML><title>404</title>", "is a web page, not the file itself");
+  CHECK_BYTES("v", "neither GLB nor valid JSON");  // too short to tell
+}
+
+TEST_CASE("gltf errors: buffers that are pointers of Git LFS or web pages say so") {
+  const Folder folder;
+  GltfFile file = triangleFile();
+  file.root["buffers"] = {{{"byteLength", 36}, {"uri", "a.bin"}}};
+  for (const auto& [bytes, what] :
+       {std::pair("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 36\n", "git lfs pull"),
+        std::pair("<!DOCTYPE html><title>not here, not here, not here</title>", "is a web page")}) {
+    folder.write("a.bin", bytes);
+    const std::string path = folder.write("a.gltf", file.root.dump());
+    LoadOptions strict;
+    strict.strict = true;
+    CHECK(contains(errorOf([&] { loadGltf(path, strict); }), what));
+  }
+}
+
 TEST_CASE("gltf errors: deep JSON does not overflow the stack") {
   const std::string deep = std::string(1000000, '[') + std::string(1000000, ']');
   CHECK_BYTES("{\"asset\":{\"version\":\"2.0\"},\"nodes\":" + deep + "}", "/nodes/0");

@@ -11,6 +11,7 @@
 #include "renderer/scene/gltf/document/gltf_extensions.h"
 #include "renderer/scene/gltf/document/gltf_mend.h"
 #include "renderer/scene/gltf/document/gltf_schema.h"
+#include "renderer/scene/gltf/document/other_formats.h"
 
 namespace braid::gltf {
 
@@ -98,9 +99,11 @@ Json parse(Document& document) {
     return Json::parse(document.json.begin(), document.json.end());
   } catch (const Json::exception& error) {
     const std::string mended = mendText(document.json, document.report);
-    const std::string why = "is neither GLB nor valid JSON: ";
     Json root = Json::parse(mended, nullptr, false);
-    if (root.is_discarded()) refuse(document, why + parseReason(error) + "; export it again");
+    const std::string other = root.is_discarded() ? otherFormat(document.json) : std::string();
+    if (!other.empty()) refuse(document, other);
+    if (root.is_discarded())
+      refuse(document, "is neither GLB nor valid JSON: " + parseReason(error) + "; export it again");
     return root;
   }
 }

@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "renderer/scene/gltf/document/gltf_report.h"
+#include "renderer/scene/gltf/document/other_formats.h"
 
 namespace braid::gltf {
 
@@ -205,6 +206,8 @@ std::optional<std::vector<uint8_t>> Files::readPath(const std::string& name, std
   }
   std::optional<std::vector<uint8_t>> data = readFile(path, reason);
   if (!data) reason += "; put it beside the scene or correct the uri";
+  if (data) reason = noFileAtAll(*data);
+  if (!reason.empty()) data.reset();
   return data;
 }
 
