@@ -221,6 +221,7 @@ std::string writeResult(const CombineOptions& o, const PipelineResult& result, I
 }
 
 int runCombine(const CombineOptions& o) {
+  if (o.unbiased.empty()) throw Error(ExitCode::Usage, "combine: name the image: braid combine FILE -o OUT.exr");
   checkOutputs(o);
   const std::vector<std::string>& wanted = o.choice.methods;
   if (wanted.empty()) throw Error(ExitCode::Usage, "--method: name at least one method (braid --list)");
@@ -248,11 +249,13 @@ int runCombine(const CombineOptions& o) {
 }
 
 void addInputOptions(CLI::App& command, CombineOptions& o) {
+  CLI::Option* files =
+      command.add_option("FILES", o.unbiased, "The unbiased image, in the forms of --unbiased")->type_name("FILES");
   command
       .add_option("--unbiased", o.unbiased,
                   "FILE, or FILE:ESTIMATE of braid's, FILE:LAYER of others'; HALFA,HALFB: two renders with "
                   "different seeds; or FILE,HALFA,HALFB")
-      ->required()
+      ->excludes(files)
       ->type_name("FILES");
   command.add_option("--correlated", o.correlated, "The same, for the estimate by common random numbers or gradients")
       ->type_name("FILES");
@@ -260,9 +263,10 @@ void addInputOptions(CLI::App& command, CombineOptions& o) {
       .add_option("--reference", o.reference,
                   "Image that the true errors are measured by, for ideal and ensemble-oracle")
       ->type_name("FILE");
+  o.choice.methods = {kDefaultMethod};
   addWords(command, "--method", o.choice.methods, parseMethods,
            "Methods to run, separated by commas; the last one is the image R G B")
-      ->required()
+      ->default_str(kDefaultMethod)
       ->type_name("NAMES");
   addCombineOptions(command, o.choice);
   command.get_option("--biased")
@@ -291,9 +295,11 @@ void addOutputOptions(CLI::App& command, CombineOptions& o) {
 constexpr const char* kCombineHints =
     "METHOD@INPUT chooses the biased input of one method, e.g. js@ensemble.\n"
     "Examples:\n"
-    "  braid combine --unbiased out.exr --method js -o js.exr\n"
-    "  braid combine --unbiased out.exr --method js --biased ensemble --bases nfor,nlm -o js.exr\n"
-    "  braid combine --unbiased seed1.exr,seed2.exr --biased denoised.exr --method average -o a.exr\n"
+    "  braid render scene.glb --aovs all -o out.exr\n"
+    "  braid combine out.exr -o clean.exr\n"
+    "  braid combine out.exr --method js -o js.exr\n"
+    "  braid combine out.exr --method js --biased ensemble --bases nfor,nlm -o js.exr\n"
+    "  braid combine seed1.exr,seed2.exr --biased denoised.exr --method average -o a.exr\n"
     "Files of pbrt, Mitsuba 3 and Cycles are read by their channel names. Where one image is all there\n"
     "is, its variance is estimated from neighbouring pixels, and halves are made from it (the header says\n"
     "so).";

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// `braid info`: what a scene file holds.
+// `braid info`: what a scene, an image or the state of a render holds.
+#include <sstream>
+
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "renderer/core/error.h"
+#include "tools/images/file_record.h"
 #include "tools/options/cli.h"
 #include "tools/options/syntax/help.h"
 #include "tools/options/open_scene.h"
@@ -46,12 +50,39 @@ void print(const nlohmann::json& j) {
   for (const auto& note : j["notes"]) fmt::print("  note        {}\n", note.get<std::string>());
 }
 
+// A value of a header in one line, or under its name.
+std::string valueText(const nlohmann::json& value) {
+  std::istringstream lines(value.is_string() ? value.get<std::string>() : value.dump());
+  std::string text;
+  for (std::string line; std::getline(lines, line);) text += (text.empty() ? "" : "\n      ") + printable(line);
+  return text;
+}
+
+void printFile(const nlohmann::json& j) {
+  const nlohmann::json &size = j["size"], &window = j["window"];
+  fmt::print("{}\n", j["file"].get<std::string>());
+  fmt::print("  {:<11} {}x{}\n", j["kind"].get<std::string>(), size[0].dump(), size[1].dump());
+  if (window != nlohmann::json{0, 0, size[0], size[1]}) fmt::print("  window      {}\n", window.dump());
+  if (j.contains("layers"))
+    for (const auto& [name, channels] : j["layers"].items())
+      fmt::print("  layer       {} {}\n", name.empty() ? "(image)" : name, channels.dump());
+  if (j.contains("passes"))
+    for (const auto& [name, intervals] : j["passes"].items())
+      fmt::print("  passes      {} {}\n", name, intervals.dump());
+  if (j.contains("seed")) fmt::print("  seed        {}\n", j["seed"].dump());
+  for (const char* group : {"options", "attributes"})
+    if (j.contains(group))
+      for (const auto& [name, value] : j[group].items()) fmt::print("  {}: {}\n", name, valueText(value));
+}
+
 int runInfo(InfoOptions o) {
   o.scene.quiet = o.scene.quiet || o.json;  // warnings are in the record
-  const OpenedScene opened = openScene(o.scene);
-  const nlohmann::json record = sceneRecord(*opened.scene);
+  const std::optional<nlohmann::json> file = fileRecord(o.scene.file);
+  const nlohmann::json record = file ? *file : sceneRecord(*openScene(o.scene).scene);
   if (o.json)
     fmt::print("{}\n", record.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  else if (file)
+    printFile(record);
   else
     print(record);
   return 0;
@@ -61,8 +92,8 @@ int runInfo(InfoOptions o) {
 
 void addInfo(CLI::App& app, Action& action) {
   auto options = std::make_shared<InfoOptions>();
-  CLI::App* command = app.add_subcommand("info", "Print what a scene file holds");
-  command->footer("Example:\n  braid info scene.glb --json");
+  CLI::App* command = app.add_subcommand("info", "Print what a scene holds, or an image, or the state of a render");
+  command->footer("Examples:\n  braid info scene.glb --json\n  braid info out.exr");
   addSceneOptions(*command, options->scene);
   command->add_flag("--json", options->json, "As JSON");
   showFirst(*command, kOutputHelp, {"--json"});

@@ -38,9 +38,10 @@ int run(int argc, char** argv) {
       fmt::print("{}", helpText(app, *help));
       return 0;
     }
+    // Beside any command, without the scene or output that it asks for.
+    if (std::find(arguments.begin(), arguments.end(), "--list") != arguments.end()) return printLists();
     std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
     app.parse(std::move(arguments));
-    if (options.list) return printLists();
     if (!options.documents.empty()) {
       writeDocuments(app, options.documents);
       return 0;

@@ -11,7 +11,8 @@ namespace braid {
 
 void addCommands(CLI::App& app, MainOptions& o, Action& action) {
   app.require_subcommand(0, 1);
-  app.add_flag("--list", o.list, "Print every registered integrator, denoiser, combiner and metric");
+  app.add_flag_function(  // main() prints
+      "--list", [](int64_t) {}, "Print every registered integrator, denoiser, combiner and metric");
   app.add_option("--documents", o.documents, "Write man pages and completions of shells to a folder")
       ->type_name("FOLDER")
       ->group("");

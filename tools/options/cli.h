@@ -28,7 +28,6 @@ void addSweep(CLI::App& app, Action& action);
 
 // The options of braid itself, and all subcommands.
 struct MainOptions {
-  bool list = false;
   std::string documents;     // folder that gets man pages and completions; empty: none
   uint64_t memoryLimit = 0;  // bytes, 0: none of our own
 };

@@ -222,9 +222,45 @@ TEST_CASE("plan, info and the lists tell what there is") {
   CHECK(list.code == 0);
   for (const char* word : {"integrators", "pt ", "metrics", "relMSE", "FLIP"})
     CHECK_MESSAGE(contains(list.out, word), word);
+  for (const char* beside : {"sweep --list", "bench --list", "render --list"})
+    CHECK(braidRun(folder, beside).out == list.out);
   CHECK(braidRun(folder, "--version").code == 0);
   for (const char* command : {"", "render", "plan", "info", "compare", "replay", "bench"})
     CHECK(braidRun(folder, std::string(command) + " --help").code == 0);
+}
+
+TEST_CASE("info tells what images and states hold, and what other files are") {
+  const Folder folder;
+  REQUIRE(braidRun(folder, renderCommand("--spp 4 --crop 4,2,20,14 --checkpoint run.state")).code == 0);
+  const auto record = [&](const std::string& file) {
+    const Run run = braidRun(folder, "info --json " + file);
+    INFO(run.err);
+    REQUIRE(run.code == 0);
+    return Json::parse(run.out);
+  };
+  const Json image = record("out.exr");
+  CHECK(image["kind"] == "image");
+  CHECK(image["window"] == Json{4, 2, 20, 14});
+  CHECK(image["layers"][""] == Json{"R", "G", "B"});
+  CHECK(image["layers"].contains("Albedo"));
+  CHECK(image["attributes"]["samplesPerPixel"] == 4);
+  const Json state = record("run.state");
+  CHECK(state["kind"] == "state");
+  CHECK(state["size"] == image["size"]);
+  CHECK(state["passes"]["pt"] == Json{{0, 4}});
+  CHECK(state["options"]["--crop"] == "4,2,20,14");
+  CHECK(contains(braidRun(folder, "info out.exr").out, "  braid/seed: 0\n"));
+  CHECK(contains(braidRun(folder, "info run.state").out, "  passes      pt [[0,4]]\n"));
+
+  std::ofstream(folder.path / "cut.exr") << "\x76\x2F\x31\x01";
+  std::ofstream(folder.path / "cut.state") << "braid-state 3 100";
+  std::ofstream(folder.path / "model.fbx") << "Kaydara FBX Binary";
+  for (const char* file : {"cut.exr", "cut.state", "model.fbx"}) {
+    const Run run = braidRun(folder, std::string("info ") + file);
+    CHECK(run.code == 2);
+    CHECK(lines(run.err) == 1);
+    CHECK(contains(run.err, file));
+  }
 }
 
 TEST_CASE("Animations are listed with their lengths, and chosen by name or index") {

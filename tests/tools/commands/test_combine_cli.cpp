@@ -89,6 +89,17 @@ TEST_CASE("Combined later from the file, the images are the same bit for bit") {
   CHECK(std::sqrt(test::meanSquaredError(same, a.rgb("pt.mean"))) < 1e-6 * test::meanOfImage(same));
 }
 
+TEST_CASE("An image alone is combined by auto") {
+  const Folder folder;
+  rendered(folder, "--float -o noisy.exr");
+  combined(folder, "noisy.exr -o a.exr");
+  combined(folder, "--unbiased noisy.exr --method auto -o b.exr");
+  CHECK(identical(readImage(folder.path / "a.exr").rgb(), readImage(folder.path / "b.exr").rgb("combined.auto")));
+  for (const char* wrong : {"-o c.exr", "noisy.exr --unbiased noisy.exr -o c.exr", "noisy.exr --method none -o c.exr"})
+    CHECK(braidRun(folder, std::string("combine ") + wrong).code == 1);
+  CHECK_FALSE(fs::exists(folder.path / "c.exr"));
+}
+
 TEST_CASE("A session keeps the variances after 1, 2, 4, … rounds when asked") {
   const Scene scene(cornellBox());
   Settings settings = test::settingsFor(16, 12, 9);
@@ -138,7 +149,7 @@ TEST_CASE("Errors of combining end with their exit codes and one line") {
   };
   refused("combine --unbiased a.exr --method jss -o o.exr", 1, "unknown method 'jss': known are ");
   refused("combine --unbiased a.exr --method , -o o.exr", 1, "at least one");
-  refused("combine --unbiased a.exr -o o.exr", 1, "--method");
+  refused("combine --method box -o o.exr", 1, "name the image: braid combine FILE");
   refused("combine --unbiased none.exr --method box -o o.exr", 2, "none.exr: no such file");
   refused("combine --unbiased a.exr --method box -o nowhere/o.exr", 3, "nowhere");
   refused("combine --unbiased a.exr --method box --aovs some -o o.exr", 1, "none, features, all");

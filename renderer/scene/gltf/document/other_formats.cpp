@@ -85,6 +85,8 @@ std::string found(std::span<const uint8_t> bytes, std::span<const Beginning> amo
 
 std::string noFileAtAll(std::span<const uint8_t> bytes) { return found(bytes, kNoFiles, ""); }
 
+bool isImage(std::span<const uint8_t> bytes) { return !found(bytes, kImages, "").empty(); }
+
 std::string otherFormat(std::span<const uint8_t> bytes) {
   for (const std::string& text : {noFileAtAll(bytes), found(bytes, kImages, kLook), found(bytes, kScenes, kConvert),
                                   found(bytes, kArchives, kUnpack)})

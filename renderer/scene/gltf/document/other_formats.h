@@ -15,4 +15,7 @@ std::string otherFormat(std::span<const uint8_t> bytes);
 // The same for what stands in the place of any file: pointers of Git LFS, and pages of servers.
 std::string noFileAtAll(std::span<const uint8_t> bytes);
 
+// Whether they begin as an image does.
+bool isImage(std::span<const uint8_t> bytes);
+
 }  // namespace braid::gltf
