@@ -5,15 +5,10 @@
 #include <cmath>
 
 #include "combiners/pixels/finite_float.h"
+#include "combiners/pixels/least_albedo.h"
 #include "renderer/core/parallel.h"
 
 namespace braid {
-
-namespace {
-
-constexpr float kMinAlbedo = 0.03f;  // what the filters divide by at least
-
-}  // namespace
 
 Plane<float> albedoNoise(const Rgb<float>& image, const Features* features) {
   if (!features || features->albedo.mean.empty()) return {};
@@ -31,7 +26,7 @@ Plane<float> albedoNoise(const Rgb<float>& image, const Features* features) {
       if (!depth.empty() && depth[i] == 0) continue;
       double sum = 0;
       for (size_t c = 0; c < 3; ++c) {
-        const auto divisor = static_cast<double>(std::max(albedo.mean[c][i], kMinAlbedo));
+        const auto divisor = static_cast<double>(std::max(albedo.mean[c][i], kLeastAlbedo));
         sum += sqr(static_cast<double>(image[c][i]) / divisor) * variance(c, i);
       }
       if (std::isfinite(sum)) noise[i] = finiteFloat(std::max(0.0, sum / 3));

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "combiners/denoise/pw/pw_filter.h"
+#include "combiners/pixels/least_albedo.h"
 #include "renderer/core/parallel.h"
 #include "renderer/film/features.h"
 
@@ -16,7 +17,6 @@ namespace {
 constexpr PatchWelchNeighbours kNeighbours{4};
 constexpr float kGuidance = 0.5f;
 constexpr float kMostDeviations = 2;
-constexpr float kMinAlbedo = 0.03f;  // what the filters divide by at least
 
 bool hasNoise(const FeaturePlanes<Rgb<float>>& albedo) {
   if (albedo.mean.empty() || albedo.variance.empty()) return false;
@@ -55,7 +55,7 @@ void settleAlbedo(Estimate& image, const Rgb<float>& variance, const Features* f
       const float r = sampled[0][i], g = sampled[1][i], b = sampled[2][i];
       const bool surface = std::min({r, g, b}) >= 0 && std::max({r, g, b}) <= 1 && (depth.empty() || depth[i] != 0);
       for (size_t c = 0; c < 3 && surface; ++c) {
-        const float factor = std::max(settled[c][i], kMinAlbedo) / std::max(sampled[c][i], kMinAlbedo);
+        const float factor = std::max(settled[c][i], kLeastAlbedo) / std::max(sampled[c][i], kLeastAlbedo);
         const float most = kMostDeviations * std::sqrt(std::max(variance[c][i], 0.0f));
         for (Rgb<float>* part : {&image.mean, &image.half[0], &image.half[1]})
           if (!part->empty()) (*part)[c][i] += std::clamp((factor - 1) * (*part)[c][i], -most, most);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "combiners/pixels/box_mean.h"
+#include "combiners/pixels/least_albedo.h"
 #include "combiners/pixels/mean_depth.h"
 #include "renderer/core/parallel.h"
 #include "renderer/core/vec.h"
@@ -13,7 +14,6 @@ namespace braid {
 
 namespace {
 
-constexpr float kMinAlbedo = 0.03f;
 // Deviations are relative to the brightness around, which is rarely less.
 constexpr float kDark = 0.01f;
 
@@ -58,7 +58,7 @@ void demodulate(const Rgb<float>& image, const KpnScene& scene, float varianceFa
     const bool surface = f && isSurface(*f, i);
     Spectrum deviation;
     for (size_t c = 0; c < 3; ++c) {
-      const float divisor = surface ? std::max(f->albedo.mean[c][i], kMinAlbedo) : 1.0f;
+      const float divisor = surface ? std::max(f->albedo.mean[c][i], kLeastAlbedo) : 1.0f;
       out.divisor[c][i] = divisor;
       out.irradiance[c][i] = image[c][i] / divisor;
       deviation[static_cast<int>(c)] = std::sqrt(std::max(scene.variance[c][i], 0.0f)) / divisor;

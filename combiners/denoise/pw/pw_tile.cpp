@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "combiners/pixels/least_albedo.h"
 #include "combiners/pixels/mean_depth.h"
 #include "combiners/statistics/variance.h"
 #include "renderer/core/error.h"
@@ -13,7 +14,6 @@ namespace braid {
 
 namespace {
 
-constexpr float kMinAlbedo = 0.03f;
 constexpr float kAlbedoSd = 0.25f, kNormalSd = 0.25f;
 constexpr float kApart = 100;  // far more than guides differ by: 2^-(100²) is nothing
 const float kAlbedoScale = std::sqrt(0.5f * kLog2E) / kAlbedoSd, kNormalScale = std::sqrt(0.5f * kLog2E) / kNormalSd;
@@ -32,7 +32,7 @@ void divisorRow(const float* __restrict own, const float* __restrict second, con
   for (int x = 0; x < count; ++x) {
     const float a = finiteOrZero(own[x]), b = finiteOrZero(second[x]), c = finiteOrZero(third[x]);
     const bool surface = std::max(std::max(a, b), c) <= 1 && (!depth || depth[x] != 0);
-    out[x] = surface ? std::max(a, kMinAlbedo) : 1.0f;
+    out[x] = surface ? std::max(a, kLeastAlbedo) : 1.0f;
   }
 }
 

@@ -8,6 +8,7 @@
 #include "combiners/denoise/rdfc/rdfc_features.h"
 #include "combiners/denoise/rdfc/rdfc_second_pass.h"
 #include "combiners/denoise/rdfc/rdfc_window.h"
+#include "combiners/pixels/least_albedo.h"
 #include "combiners/statistics/variance.h"
 #include "combiners/statistics/fireflies.h"
 #include "renderer/core/error.h"
@@ -17,7 +18,6 @@ namespace braid {
 namespace {
 
 constexpr float kLargest = 1e9f;
-constexpr float kMinAlbedo = 0.03f;
 constexpr int kRescaleRadius = 10;
 // Radius of the range of results, which the paper does not have (combiners/EXPERIMENTS.md, Range of alike pixels).
 constexpr int kRange = 2;
@@ -34,7 +34,7 @@ Rgb<float> divisors(const Features* features, int width, int height) {
   for (size_t i = 0; i < out.size(); ++i) {
     const Vec3 a(finiteOrZero(albedo[0][i]), finiteOrZero(albedo[1][i]), finiteOrZero(albedo[2][i]));
     if (maxComponent(a) > 1 || (!depth.empty() && depth[i] == 0)) continue;
-    out.set(i, glm::max(a, Vec3(kMinAlbedo)));
+    out.set(i, glm::max(a, Vec3(kLeastAlbedo)));
   }
   return out;
 }
