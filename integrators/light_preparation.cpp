@@ -14,8 +14,8 @@ namespace {
 // are noisy everywhere alike, which is what filters are good at (combiners/EXPERIMENTS.md, Where photons and
 // connections pay).
 constexpr double kCausticVariance = 10;
-// Connections cost more than camera paths: beside a photon map they pay where caustics are much of the light. Where
-// caustics cannot be met by camera paths at all, the unbiased image needs them.
+// Connections cost more than camera paths: beside a photon map they pay where caustics that are met by chance are much
+// of the light. Where camera paths cannot meet some light at all, the unbiased image needs them.
 constexpr double kCausticShare = 0.04;
 constexpr double kUnreachableShare = 0.001;
 // Of all light, that media bring from lights without size.
@@ -55,16 +55,18 @@ Applies connectionsApply(const SceneTraits& traits, const LightReach& reach) {
                         "no camera path finds it",
                         100 * reach.throughMedia)};
   Applies photons = photonsApply(traits, reach);
-  if (!photons.yes || reach.caustic >= kCausticShare) return photons;
-  if (reach.unreachable >= kUnreachableShare)
+  if (!photons.yes || reach.causticBySmooth >= kCausticShare) return photons;
+  const double beyond = reach.beyondCameraPaths - reach.throughMedia;
+  if (beyond >= kUnreachableShare)
     return {true,
-            fmt::format("caustics of lights without size are {:.2g} % of the light in view: no camera path finds "
-                        "them",
-                        100 * reach.unreachable),
+            fmt::format("{:.2g} % of the light in view comes from lights without size over smooth surfaces: no camera "
+                        "path finds it",
+                        100 * beyond),
             true};
   return {false,
-          fmt::format("caustics are only {:.2g} % of the light in view: photons beside camera paths cost less",
-                      100 * reach.caustic),
+          fmt::format("caustics of smooth surfaces are only {:.2g} % of the light in view: photons beside camera "
+                      "paths cost less",
+                      100 * reach.causticBySmooth),
           true};
 }
 

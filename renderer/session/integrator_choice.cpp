@@ -36,7 +36,7 @@ constexpr double kSamplesAhead = 64;
 constexpr double kShadowCost = 0.4, kPhotonCost = 0.05, kGatherCost = 0.2;
 // Of a ray whose vertices are connected to others, in rays.
 constexpr double kConnectingCost = 1.25;
-// Squared relative error where the caustics that are found by rare chance are not met, over their squared share.
+// Squared relative error where caustics that are found by rare chance alone are not met, over their squared share.
 constexpr double kUnmetCaustics = 2;
 
 // Whether some of the light of points and directions may be scattered by mirrors or smooth refraction first.
@@ -249,7 +249,8 @@ PlanLine choose(const TransportContext& context, const CameraData& camera, const
   });
   std::vector<PilotMeasure> measures = pilot.measures();
   for (size_t i = 0; i < open.size(); ++i)
-    measures[i].hidden = kUnmetCaustics * sqr(open[i]->integrator->splats() ? reach.causticOverMirrors : reach.caustic);
+    measures[i].hidden =
+        kUnmetCaustics * sqr(open[i]->integrator->splats() ? reach.causticOverMirrors : reach.causticBySmooth);
   const MixtureChoice choice = chooseMixture(mixtures, 0, measures, kSamplesAhead);
   std::vector<std::string> errors, costs;
   for (size_t m = 0; m < mixtures.size(); ++m)

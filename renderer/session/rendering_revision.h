@@ -8,6 +8,6 @@ namespace braid {
 // Raise it by one with every change after which an integrator or `auto` makes other pixels, be it another sample or
 // another expectation. tests/integrators/test_rendering_revision.cpp sees such changes, and says how to record the new
 // pixels.
-inline constexpr int kRenderingRevision = 14;
+inline constexpr int kRenderingRevision = 15;
 
 }  // namespace braid

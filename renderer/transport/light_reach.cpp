@@ -29,10 +29,13 @@ std::map<uint32_t, double> lampAreas(const Scene& scene) {
   return areas;
 }
 
-// Share of the hemisphere that the lamp fills, seen over `length` metres of path.
-double chanceToHit(double area, float length) {
-  const double share = area / (static_cast<double>(kPi) * sqr(static_cast<double>(length)));
-  return std::clamp(share, kLeastProbability, 1.0);
+// The probability that a camera path from a surface finds a caustic there: the share of the hemisphere that the lamp
+// fills, seen over `length` metres of path, or that of the directions to which the rough surface on the way sends what
+// it focuses, with this density per steradian (infinite: smooth). There a light sample finds the lamp.
+double chanceToFind(double area, float length, float pdfW) {
+  const double lamp = area / (static_cast<double>(kPi) * sqr(static_cast<double>(length)));
+  const double lobe = 1 / (static_cast<double>(kPi) * static_cast<double>(pdfW));
+  return std::clamp(std::max(lamp, lobe), kLeastProbability, 1.0);
 }
 
 // Where in space the camera sees rough surfaces, also over mirrors and through glass: cells that grow with the distance
@@ -141,15 +144,15 @@ class ReachSums {
       if (state.leastPdfW == 0) reach_.throughMedia += value;  // media alone make it that
       if (vertex.deltaOnly) reach_.beyondConnections += visible_.densityOverMirrors(vertex.hit.position) * light;
     }
-    addShares(state, vertex, light, value, lamp);
+    addShares(state, vertex, light, value, aimless);
     return Onward::Scatter;
   }
 
   LightReach result() const {
     LightReach r = reach_;
     if (total_ > 0)
-      for (double* share : {&r.direct, &r.indirect, &r.caustic, &r.causticOverMirrors, &r.causticVariance,
-                            &r.unreachable, &r.beyondCameraPaths, &r.beyondConnections, &r.throughMedia})
+      for (double* share : {&r.direct, &r.indirect, &r.caustic, &r.causticBySmooth, &r.causticOverMirrors,
+                            &r.causticVariance, &r.beyondCameraPaths, &r.beyondConnections, &r.throughMedia})
         *share /= total_;
     if (scattered_ > 0 && std::isfinite(scattered_))
       r.scatteredRadiance = scattered_ / (static_cast<double>(kPi) * kPaths * visible_.total());
@@ -157,7 +160,8 @@ class ReachSums {
   }
 
  private:
-  void addShares(const SubpathState& state, const SubpathVertex& vertex, double light, double value, bool lamp) {
+  // `aimless`: light samples cannot be aimed over the first surface.
+  void addShares(const SubpathState& state, const SubpathVertex& vertex, double light, double value, bool aimless) {
     if (vertex.segments == 1 && !vertex.walked) {
       reach_.direct += value;
       return;
@@ -170,9 +174,11 @@ class ReachSums {
     }
     reach_.caustic += value;
     reach_.causticOverMirrors += visible_.densityOverMirrors(vertex.hit.position) * light;
-    if (!lamp) reach_.unreachable += value;
+    const bool lamp = state.light < context_.lights.firstPositional();
+    const float pdfW = aimless ? kInfinity : state.leastPdfW;
+    if (pdfW == kInfinity) reach_.causticBySmooth += value;
     const double area = lamp ? areas_.at(context_.scene.emitters()[state.light].mesh) : 0;
-    reach_.causticVariance += value / chanceToHit(area, state.travelled);
+    reach_.causticVariance += value / chanceToFind(area, state.travelled, pdfW);
   }
 
   const TransportContext& context_;

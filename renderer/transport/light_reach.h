@@ -14,12 +14,15 @@ struct LightReach {
   double direct = 0;    // arriving straight from a light
   double indirect = 0;  // after scattering, the last time from a rough surface
   double caustic = 0;   // the last time from a mirror, a lens or another surface that focuses
+  // Of the caustics what smooth surfaces focus, over which no light sample can be aimed: camera paths have to hit the
+  // light by chance.
+  double causticBySmooth = 0;
   // Of the caustics what the camera sees over mirrors and through glass alone: connections find it by rare chance.
   double causticOverMirrors = 0;
-  // Relative variance that caustics give to one camera path which can only find them by chance: Σ share / probability
-  // of hitting the light over the focusing surface. 1 is as bad as a signal that one path in two sees.
+  // Relative variance that caustics give to one camera path: Σ share / probability of finding it, by hitting the light
+  // over the focusing surface or, where that is rough, by sampling the light there. 1 is as bad as a signal that one
+  // path in two sees.
   double causticVariance = 0;
-  double unreachable = 0;  // of the caustics: from points and directions, which no camera path can hit
   // Not a share: the radiance that all light but the direct gives to a white surface, averaged over what the camera
   // sees, W/(m² sr).
   double scatteredRadiance = 0;

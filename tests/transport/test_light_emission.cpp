@@ -169,39 +169,60 @@ TEST_CASE("A starting point and its density see the same probability of being ch
   }
 }
 
+namespace {
+
+// Of the Cornell box with its lamp scaled, and a ball of glass, of metal of a roughness, or none.
+LightReach reachOf(float lampScale, bool ball, float metalRoughness = -1) {
+  SceneData data = cornellBox();
+  for (TriangleMesh& mesh : data.meshes) {
+    if (!data.materials[mesh.material].emissive()) continue;
+    Vec3 centre(0);
+    for (const Vec3& p : mesh.positions) centre += p / static_cast<float>(mesh.positions.size());
+    for (Vec3& p : mesh.positions) p = centre + (p - centre) * lampScale;
+  }
+  if (ball) {
+    Material material = diffuseMaterial(Spectrum(1));
+    if (metalRoughness >= 0) {
+      material.metallic = 1;
+      material.roughness = metalRoughness;
+    } else {
+      material.transmission = material.specular = 1;
+      material.roughness = 0;
+      material.thinWalled = false;
+    }
+    data.materials.push_back(material);
+    TriangleMesh sphere;
+    addSphere(sphere, {0.3f, 0.3f, 0.3f}, 0.35f, 3);
+    addMesh(data, std::move(sphere), static_cast<uint32_t>(data.materials.size() - 1));
+  }
+  const Scene scene(std::move(data));
+  const TransportContext context(scene);
+  return measureLightReach(context, Camera(scene.data().cameras.at(0), 64, 64), 64, 64);
+}
+
+}  // namespace
+
 TEST_CASE("The reach of light tells a caustic of a small lamp from one of a large lamp, and from none") {
-  const auto reach = [](bool ball, float lampScale) {
-    SceneData data = cornellBox();
-    for (TriangleMesh& mesh : data.meshes) {
-      if (!data.materials[mesh.material].emissive()) continue;
-      Vec3 centre(0);
-      for (const Vec3& p : mesh.positions) centre += p / static_cast<float>(mesh.positions.size());
-      for (Vec3& p : mesh.positions) p = centre + (p - centre) * lampScale;
-    }
-    if (ball) {
-      Material glass = diffuseMaterial(Spectrum(1));
-      glass.transmission = glass.specular = 1;
-      glass.roughness = 0;
-      glass.thinWalled = false;
-      data.materials.push_back(glass);
-      TriangleMesh sphere;
-      addSphere(sphere, {0.3f, 0.3f, 0.3f}, 0.35f, 3);
-      addMesh(data, std::move(sphere), static_cast<uint32_t>(data.materials.size() - 1));
-    }
-    const Scene scene(std::move(data));
-    const TransportContext context(scene);
-    return measureLightReach(context, Camera(scene.data().cameras.at(0), 64, 64), 64, 64);
-  };
-  const LightReach none = reach(false, 1), large = reach(true, 1), small = reach(true, 0.02f);
+  const LightReach none = reachOf(1, false), large = reachOf(1, true), small = reachOf(0.02f, true);
   CHECK(none.caustic == 0);
   CHECK(none.direct + none.indirect == doctest::Approx(1));
   CHECK(large.caustic > 0.01);
   CHECK(small.caustic > 0.01);
   CHECK(large.causticVariance < 20);
   CHECK(small.causticVariance > 100 * large.causticVariance);
-  const LightReach again = reach(true, 1);
+  CHECK(small.causticBySmooth == small.caustic);
+  const LightReach again = reachOf(1, true);
   CHECK(again.caustic == large.caustic);
   CHECK(again.causticVariance == large.causticVariance);
+}
+
+TEST_CASE("Light samples find what rough surfaces focus: however small the lamp, it is no rare light") {
+  const LightReach rough = reachOf(0.02f, true, 0.3f), smooth = reachOf(0.02f, true, 0);
+  CHECK(rough.caustic > 0.001);
+  CHECK(rough.causticBySmooth == 0);
+  CHECK(rough.causticVariance < 100 * rough.caustic);  // one direction in a hundred at worst
+  CHECK(smooth.causticBySmooth == smooth.caustic);
+  CHECK(smooth.causticVariance > 1000 * smooth.caustic);
 }
 
 }  // namespace braid::test_light_emission

@@ -59,10 +59,12 @@ TEST_CASE(
   reach.causticVariance = 100;
   CHECK(photonsApply(traits, reach).yes);
   CHECK(!connectionsApply(traits, reach).yes);
-  reach.unreachable = 0.01;
+  reach.beyondCameraPaths = 0.01;
   CHECK(connectionsApply(traits, reach).yes);
-  reach.unreachable = 0;
+  reach.beyondCameraPaths = 0;
   reach.caustic = 0.07;
+  CHECK(!connectionsApply(traits, reach).yes);
+  reach.causticBySmooth = 0.07;
   CHECK(connectionsApply(traits, reach).yes);
   reach = LightReach();
   CHECK(!photonsApply(traits, reach).yes);
