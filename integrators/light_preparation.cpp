@@ -14,6 +14,8 @@ namespace {
 // are noisy everywhere alike, which is what filters are good at (combiners/EXPERIMENTS.md, Where photons and
 // connections pay).
 constexpr double kCausticVariance = 10;
+// Of the light in view; with fewer there is nothing to tell.
+constexpr double kFewCaustics = 0.001;
 // Connections cost more than camera paths: beside a photon map they pay where caustics that are met by chance are much
 // of the light. Where camera paths cannot meet some light at all, the unbiased image needs them.
 constexpr double kCausticShare = 0.04;
@@ -44,8 +46,10 @@ Applies photonsApply(const SceneTraits& traits, const LightReach& reach) {
                         "variance of all the rest",
                         100 * reach.caustic, reach.causticVariance),
             true};
-  return {false, fmt::format("no caustics to speak of ({:.2g} % of the light in view), and camera paths find the rest",
-                             100 * reach.caustic)};
+  return {false, reach.caustic < kFewCaustics
+                     ? fmt::format("no caustics to speak of ({:.2g} % of the light in view)", 100 * reach.caustic)
+                     : fmt::format("caustics are {:.2g} % of the light in view, and camera paths find them",
+                                   100 * reach.caustic)};
 }
 
 Applies connectionsApply(const SceneTraits& traits, const LightReach& reach) {
