@@ -2,6 +2,7 @@
 #include "tools/images/file_record.h"
 
 #include <array>
+#include <filesystem>
 #include <fstream>
 #include <span>
 #include <string_view>
@@ -38,7 +39,8 @@ Json namedValues(const std::vector<Attribute>& attributes) {
 }
 
 Json recordOf(const std::string& path, const char* kind, int width, int height, const PixelWindow& window) {
-  return {{"file", path},
+  return {{"schema", 1},
+          {"file", path},
           {"kind", kind},
           {"size", {width, height}},
           {"window", {window.x0, window.y0, window.x1, window.y1}}};
@@ -76,6 +78,8 @@ Json stateRecord(const std::string& path) {
 }  // namespace
 
 std::optional<Json> fileRecord(const std::string& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return std::nullopt;  // pipes may never deliver
   std::array<char, 32> beginning{};
   std::ifstream stream(path, std::ios::binary);
   stream.read(beginning.data(), beginning.size());

@@ -6,6 +6,7 @@
 
 #include <doctest/doctest.h>
 #include <spawn.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 
 #include "renderer/film/files/exr.h"
@@ -255,7 +256,8 @@ TEST_CASE("info tells what images and states hold, and what other files are") {
   std::ofstream(folder.path / "cut.exr") << "\x76\x2F\x31\x01";
   std::ofstream(folder.path / "cut.state") << "braid-state 3 100";
   std::ofstream(folder.path / "model.fbx") << "Kaydara FBX Binary";
-  for (const char* file : {"cut.exr", "cut.state", "model.fbx"}) {
+  REQUIRE(mkfifo((folder.path / "pipe.exr").c_str(), 0600) == 0);
+  for (const char* file : {"cut.exr", "cut.state", "model.fbx", "pipe.exr"}) {
     const Run run = braidRun(folder, std::string("info ") + file);
     CHECK(run.code == 2);
     CHECK(lines(run.err) == 1);
