@@ -171,7 +171,7 @@ std::string sceneUnderSky(const Folder& folder) {
   const std::string scenes = "'" BRAID_SOURCE_DIR "/scenes/";
   REQUIRE(braidRun(folder, "render " + scenes + "sun_sky.glb' -q --size 8x4 --spp 1 --combine none -o sky.exr").code ==
           0);
-  return scenes + "materials.glb' --env sky.exr --env-scale 0.01 --size 32x18 --spp 2 --ground ";
+  return scenes + "torus_glass.glb' --env sky.exr --env-scale 0.01 --size 32x18 --spp 2 --ground ";
 }
 
 }  // namespace

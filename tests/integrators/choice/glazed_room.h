@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A closed room whose only light is the sun through a pane: the glossy ball in it throws a faint caustic.
+// A closed room whose only light is the sun through a pane: the coat of the ball in it throws a faint caustic, which no
+// light sample finds where it is smooth.
 #pragma once
 
 #include "tests/support/render_fixture.h"
@@ -22,7 +23,7 @@ inline TriangleMesh wallsWithWindow() {
   return walls;
 }
 
-inline SceneData glazedRoom() {
+inline SceneData glazedRoom(float roughness = 0) {
   SceneData data;
   Material pane = diffuseMaterial(Spectrum(1));
   pane.specular = 1;
@@ -31,7 +32,7 @@ inline SceneData glazedRoom() {
   pane.thinWalled = true;
   Material ball = diffuseMaterial({0.3f, 0.1f, 0.1f});
   ball.specular = 1;
-  ball.roughness = 0.05f;
+  ball.roughness = roughness;
   data.materials = {diffuseMaterial({0.75f, 0.73f, 0.7f}), pane, ball};
   TriangleMesh glass, sphere;
   addQuad(glass, {-2, 0.9f, -0.9f}, {0, 1.2f, 0}, {0, 0, 1.6f});

@@ -58,6 +58,15 @@ TEST_CASE("In a room that the sun lights through a pane, a pilot leaves photons 
   CHECK(planOf(room(), automatic(240, 180)).text() == plan.text());
 }
 
+TEST_CASE("Where light samples find the faint caustic, for the ball is a little rough, paths alone are taken") {
+  const Scene rough(glazedRoom(0.05f));
+  const Plan plan = planOf(rough, automatic(240, 180));
+  CAPTURE(plan.text());
+  REQUIRE(plan.integrators.size() == 1);
+  CHECK(keeps(plan, "pt"));
+  CHECK(lineOf(plan, "pilot") == nullptr);
+}
+
 TEST_CASE("A pilot keeps photons where a glass throws caustics") {
   const Scene scene(loadGltf(sourcePath("scenes/torus_glass.glb")));
   const Plan plan = planOf(scene, automatic(240, 135));
