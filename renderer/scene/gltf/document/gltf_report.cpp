@@ -139,7 +139,7 @@ std::vector<std::string> Report::lines(const Usage& usage, bool used) const {
     line += kind.first->text;
     if (!kind.first->meanwhile.empty()) line += "; meanwhile " + kind.first->meanwhile;
     if (kind.count > 1) line += " (" + std::to_string(kind.count) + " times)";
-    out.push_back(std::move(line));
+    out.push_back(printable(std::move(line)));  // names of members stand in places as the file has them
   }
   return out;
 }
